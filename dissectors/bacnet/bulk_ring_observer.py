@@ -102,9 +102,9 @@ class BulkRingObserver(MstpRingObserver):
         tokens = columns.token[rows].nonzero()[0]
         if len(tokens):
             self._got = int(columns.end[begin + tokens[-1]])
-            if self._given_up is not None:
-                passed = columns.destination[begin + tokens]
-                self._given_up = None if (passed == self._given_up.mac).any() else self._given_up
+            for passed in set(columns.destination[begin + tokens].tolist()):
+                self._second.passed(passed)
+                self._unheard.heard(passed)
         self._holder, self._passed_by, self._token = int(columns.after[last]), None, None
         if columns.token[last]:
             self._passed_by, self._token = source, frame

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable
 
 from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.findings_of_damage import damage, duplicates
+from dissectors.bacnet.findings_of_hearing import TRUSTED, hasty, hearing, takes_unheard, unheard_share
+from dissectors.bacnet.findings_of_refusals import REFUSED_KEPT, Refusals
 from dissectors.bacnet.findings_of_use import polls, use
 from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
-from dissectors.bacnet.ring import COARSE_LIMIT, Ring, RingEventKind, RingNode
+from dissectors.bacnet.ring import COARSE_LIMIT, Ring, RingEventKind, RingNode, lies_between
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.bacnet.rules import RULES
-from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, times
+from dissectors.findings import Finding, Severity, as_consequence, counted, times
 from dissectors.frame import Event, Header
 from dissectors.line import Timing
 from dissectors.row_columns import RowColumns
@@ -25,6 +26,9 @@ LATE_SHARE = 0.01
 ALL_LATE = 4
 """A station is named for slow uses of the token where its share is so many times that of the others: what hits all of
 them in the same way is a busy computer."""
+
+STRAYS_SHARE = 0.2
+"""Of a second token is spoken where it shows itself so many times for each frame that the tap did not hear."""
 
 USED_BOTH_LEAST = 3
 USED_BOTH_SHARE = 0.5
@@ -39,9 +43,6 @@ ALONE_POLLS = 2 * MAX_MASTER
 
 SKIPPED_ROUNDS = 20
 """So many tokens past a station that is in the ring, and not one poll to it, are no accident."""
-
-REFUSED_KEPT = 512
-"""Most services and errors of stations that are counted apart."""
 
 _ANSWERED = frozenset((Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION))
 
@@ -71,6 +72,7 @@ def judge(ring: Ring) -> tuple[Finding, ...]:
         *_times(ring),
         *polls(ring),
         *_answers(ring),
+        *hearing(ring),
         *damage(ring),
         *duplicates(ring),
         *use(ring),
@@ -132,12 +134,14 @@ def _tokens(ring: Ring) -> Iterable[Remark]:
             and ring.of(RingEventKind.REJOINED, mac).last <= happened.last
         ):
             node = ring.nodes.get(mac)
-            if node is not None and node.last <= happened.last and not _comes_back(ring, mac, happened.last):
+            gone = node is not None and max(node.last, node.last_token) <= happened.last
+            if gone and not _comes_back(ring, mac, happened.last):
                 seen = "did not use its token, was passed over, and has been silent since"
                 yield of("MS106", mac, seen, happened)
     strays = [happened for (what, _), happened in ring.happened.items() if what is RingEventKind.TWO_TOKENS]
+    strays += hasty(ring).values()
     total = sum(happened.count for happened in strays)
-    if total >= 2 and ring.shows_tokens:
+    if total >= 2 and ring.shows_tokens and total > STRAYS_SHARE * unheard_share(ring) * ring.frames:
         together = strays[0]
         for happened in strays[1:]:
             together = together.merge(happened)
@@ -180,11 +184,11 @@ def _skipped_by(ring: Ring, mac: int, node: RingNode) -> tuple[int, int, int] | 
     if not used or node.last_polled > node.last_token or mac > MAX_MASTER:
         return None
     for (by, following), edge in ring.edges.items():
-        past = _lies_between(mac, by, following) and edge.since > node.last_token and edge.streak >= SKIPPED_ROUNDS
+        past = lies_between(mac, by, following) and edge.since > node.last_token and edge.streak >= SKIPPED_ROUNDS
         if not past or any(source == by and other.last > edge.last for (source, _), other in ring.edges.items()):
             continue
         beyond = any(
-            source == by and time > node.last_token and (_lies_between(address, mac, following) or address == following)
+            source == by and time > node.last_token and (lies_between(address, mac, following) or address == following)
             for (source, address), time in ring.polled.items()
         )
         alive = node.last > edge.since  # heard, while the token goes past it
@@ -195,23 +199,26 @@ def _skipped_by(ring: Ring, mac: int, node: RingNode) -> tuple[int, int, int] | 
     return None
 
 
-def _lies_between(mac: int, first: int, last: int) -> bool:
-    """Whether an address comes after `first` and before `last` in the order of the ring."""
-    return 0 < (mac - first) % (MAX_MASTER + 1) < ((last - first) % (MAX_MASTER + 1) or MAX_MASTER + 1)
-
-
 def _between(by: int, following: int) -> str:
     first, last = (by + 1) % (MAX_MASTER + 1), (following - 1) % (MAX_MASTER + 1)
     return str(first) if first == last else f"{first} … {last}"
 
 
+def _least_share(ring: Ring) -> float:
+    """The share of tokens or answers from which on something says more of a station than of what was not heard."""
+    return max(LATE_SHARE, TRUSTED * unheard_share(ring))
+
+
 def _counted(ring: Ring) -> Iterable[Remark]:
+    least_share = _least_share(ring)
     for code, kind, least, words in _SIMPLE:
         for (what, mac), happened in ring.happened.items():
             if what is kind and happened.count >= least:
+                if kind is RingEventKind.RETRY and takes_unheard(ring, mac):
+                    continue
                 severity = None
                 node = ring.nodes.get(mac) if mac is not None else None
-                if code == "MS102" and (happened.count == 1 or _share(happened.count, node) < LATE_SHARE):
+                if code == "MS102" and (happened.count == 1 or _share(happened.count, node) < least_share):
                     severity = Severity.NOTE
                 if code == "MS301" and happened.count == 1:
                     severity = Severity.NOTE
@@ -232,19 +239,22 @@ def _times(ring: Ring) -> Iterable[Remark]:
             if what is kind:
                 most = max((event.value or 0 for event in happened.events), default=0)
                 seen = words.format(times=times(happened.count), most=measured(most))
-                yield of(code, mac, seen, happened, pair=True)
+                answers = 0 if mac is None or mac not in ring.nodes else ring.nodes[mac].replies
+                rare = what is RingEventKind.LATE_REPLY and happened.count < TRUSTED * unheard_share(ring) * answers
+                yield of(code, mac, seen, happened, Severity.NOTE if rare else None, pair=True)
     yield from _late_uses(ring)
 
 
 def _late_uses(ring: Ring) -> Iterable[Remark]:
     uses = {mac: (ring.of(RingEventKind.LATE_USE, mac), node) for mac, node in ring.nodes.items() if node.use.count}
+    least_share = _least_share(ring)
     for mac, (late, node) in uses.items():
         given_up = ring.of(RingEventKind.GIVEN_UP, mac)
         words, evidence = [], given_up
         others = [(theirs.count, other.use.count) for who, (theirs, other) in uses.items() if who != mac]
         share = sum(count for count, _ in others) / max(1, sum(count for _, count in others))
         alone = late.count >= ALL_LATE * share * node.use.count
-        often = late.count >= max(2, LATE_SHARE * node.use.count)
+        often = late.count >= max(2, least_share * node.use.count)
         if often and not ring.coarse and alone and node.use.count >= LEAST_USES:
             words.append(
                 f"{late.count} of {node.use.count} times it used the token over {measured(T_USAGE_DELAY)} "
@@ -300,25 +310,29 @@ class MstpFindings:
     def __init__(self, timing: Timing) -> None:
         self._observer = BulkRingObserver(timing)
         self._content = ContentFindings()
-        self._asked: Counter[tuple[int, str]] = Counter()  # answered requests, by station and service
-        self._refused: dict[tuple[int, str, str], Tally] = {}  # by station, service, and class and code in words
+        self._refusals = Refusals()
+        self._newest: tuple[tuple[int, Event | None], ...] = ()  # the newest two rows, their numbers before them
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None = None) -> None:
         """Take the next row: event, its header and placement (None for noise)."""
         self._observer.see(no, event, header)
         self._content.see(no, event, header)
+        self._newest = (*self._newest[-1:], (no, event))
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed; the ring model has its own view of them, but for error answers."""
         station, verdict = transaction.station, transaction.verdict
         if station is None or transaction.is_passing or verdict not in _ANSWERED:
             return
-        if len(self._asked) < REFUSED_KEPT or (station, transaction.kind) in self._asked:
-            self._asked[station, transaction.kind] += 1
+        self._refusals.answer(station, transaction.kind)
         if verdict is Verdict.EXCEPTION:
-            key = station, transaction.kind, transaction.error or "error"
-            if key in self._refused or len(self._refused) < REFUSED_KEPT:
-                self._refused.setdefault(key, Tally()).add(transaction.end, transaction.request, transaction.response)
+            self._refusals.refuse(station, transaction, self._request_of(transaction))
+
+    def _request_of(self, transaction: Transaction) -> Event | None:
+        """The request, where its answer came directly behind it."""
+        if transaction.request is None or transaction.response != transaction.request + 1:
+            return None
+        return next((event for no, event in self._newest if no == transaction.request), None)
 
     def take(self, rows: RowColumns) -> None:
         """Take many rows, and the transactions that closed with them."""
@@ -336,15 +350,19 @@ class MstpFindings:
         told = (closed.station != NONE) & ~np.isin(closed.kind, passing)
         told &= np.isin(closed.verdict, [VERDICTS.index(verdict) for verdict in _ANSWERED])
         kinds = list(counted(closed.station[told], closed.kind[told]))
-        if len(self._asked) + len(kinds) > REFUSED_KEPT:
-            for place in np.flatnonzero(told).tolist():
-                self.settle(rows.transaction(place))
-            return
         refused = closed.verdict == VERDICTS.index(Verdict.EXCEPTION)
-        for place in np.flatnonzero(told & refused).tolist():
-            self.settle(rows.transaction(place))
-        for (station, kind), count in counted(closed.station[told & ~refused], closed.kind[told & ~refused]):
-            self._asked[station, closed.names[kind]] += count
+        full = len(self._refusals.asked) + len(kinds) > REFUSED_KEPT
+        before = self._newest[-1:]
+        for place in np.flatnonzero(told if full else told & refused).tolist():
+            transaction = rows.transaction(place)
+            at = NONE if transaction.request is None else transaction.request - rows.first
+            self._newest = before if at < 0 else ((rows.first + at, rows.row(at).event),)
+            self.settle(transaction)
+        if not full:
+            for (station, kind), count in counted(closed.station[told & ~refused], closed.kind[told & ~refused]):
+                self._refusals.asked[station, closed.names[kind]] += count
+        if len(rows):
+            self._newest = ((rows.first + len(rows) - 1, rows.row(len(rows) - 1).event),)
 
     def ring(self) -> Ring:
         """The ring so far."""
@@ -352,13 +370,5 @@ class MstpFindings:
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far, the gravest first."""
-        made = (*judge(self._observer.ring()), *self._error_answers(), *self._content.findings())
+        made = (*judge(self._observer.ring()), *self._refusals.findings(), *self._content.findings())
         return tuple(sorted(made, key=_gravest_first))
-
-    def _error_answers(self) -> Iterable[Finding]:
-        for (mac, service, words), tally in self._refused.items():
-            error = words if words.startswith(("error", "reject", "abort")) else f"error {words}"
-            answered = max(tally.count, self._asked[mac, service])
-            some = f"the only {service} request" if answered == 1 else f"{tally.count} of {answered} {service} requests"
-            severity = Severity.NOTE if tally.count == 1 else None
-            yield tally.found(RULES["MS305"], f"MAC {mac}", f"{error} in answer to {some}", severity)

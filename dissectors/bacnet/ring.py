@@ -48,7 +48,13 @@ class RingEventKind(Enum):
     LATE_POLL_REPLY = "late to answer a poll"
     ILLEGAL = "an address or length that the standard forbids"
     BROADCAST_REQUEST = "a broadcast that asks for a reply"
+    UNHEARD = "sent what was not heard here"
     SELF_TOKEN = "passed the token to itself"
+
+
+def lies_between(mac: int, first: int, last: int) -> bool:
+    """Whether an address comes after `first` and before `last` in the order of the ring."""
+    return 0 < (mac - first) % (MAX_MASTER + 1) < ((last - first) % (MAX_MASTER + 1) or MAX_MASTER + 1)
 
 
 @dataclass(frozen=True, slots=True)

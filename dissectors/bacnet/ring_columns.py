@@ -127,6 +127,9 @@ class RingColumns:
         slack_before[1:] = self.slack[:-1]
         in_time &= self.gap + slack_before < T_NO_TOKEN
         gone_on = _before(self.poll) & ~self.answers
+        in_time[1:] &= ~(gone_on & self.token)[1:] | (
+            self.destination[1:] != self.destination[:-1]
+        )  # it heard the answer
         soonest = np.zeros(len(self), np.int64)  # since a poll came alone, as `Questions` reckons
         soonest[2:] = self.start[2:] - self.end[:-2] + self.slack[:-2] - (self.end[1:-1] - self.start[1:-1])
         in_time &= ~(gone_on & ((surely > T_GO_ON) | (soonest < T_USAGE_DELAY // 2)))

@@ -2,25 +2,21 @@
 
 The token is held by one station, or on its way to one that has not used it yet. A station may send when it holds it,
 when the token is on its way to it, when it passed the token on and nobody used it, or when it was asked. Whoever sends
-otherwise has a second token, is a slave that speaks unasked, or uses a token that was given up; the one who holds the
-token is innocent of it and keeps it. When the bus was silent for 500 ms before, the token was lost and made anew.
-After damage, noise or the begin of a capture nothing is concluded: a token may have passed unseen. Times over a limit
-are judged by their smallest reading, and only where the read was not held back (`held_reads.py`).
+otherwise was passed the token in frames that were not heard (`unheard.py`), has a second token (`second_tokens.py`), is
+a slave that speaks unasked, or uses a token that was given up; the one who holds the token is innocent of it. When the
+bus was silent for 500 ms before, the token was lost and made anew. After damage, noise or the begin of a capture
+nothing is concluded: a token may have passed unseen. Times over a limit are judged by their smallest reading, and only
+where the read was not held back (`held_reads.py`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from dissectors.bacnet import message as messages
-from dissectors.bacnet.frame_types import CARRIES_NPDU, EXPECTING, HEADER, PROPRIETARY, FrameType, is_encoded
+from dissectors.bacnet.frame_types import CARRIES_NPDU, EXPECTING, HEADER, PROPRIETARY, FrameType
 from dissectors.bacnet.header import is_whole_header
 from dissectors.bacnet.held_reads import HeldReads, surely_over
 from dissectors.bacnet.limits import (
     BROADCAST,
-    MAX_DATA,
     MAX_MASTER,
-    MS,
     N_MIN_OCTETS,
     T_NO_TOKEN,
     T_USAGE_DELAY,
@@ -28,24 +24,21 @@ from dissectors.bacnet.limits import (
     TURNAROUND_BITS,
 )
 from dissectors.bacnet.repeated_token import RepeatedToken
-from dissectors.bacnet.ring import EVENTS_MAX, Ring, RingEvent, RingEventKind
+from dissectors.bacnet.ring import Ring, RingEvent, RingEventKind
+from dissectors.bacnet.ring_addresses import check_addresses, see_i_am
 from dissectors.bacnet.ring_damage import count_damage, speaker_of
-from dissectors.bacnet.ring_questions import AskedInRing, RingQuestions
+from dissectors.bacnet.ring_questions import AskedInRing, RingQuestions, is_proprietary_answer, is_second_answer
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
+from dissectors.bacnet.searches import begin_search, end_search
+from dissectors.bacnet.second_tokens import GivenUp, SecondTokens
 from dissectors.bacnet.storms import Storms
 from dissectors.bacnet.turn import Turn
-from dissectors.bacnet.values import ObjectId
+from dissectors.bacnet.unheard import UnheardFrames
 from dissectors.frame import Damage, Frame, Header, Noise, Role
 from dissectors.frame import Event as FramerEvent
 from dissectors.line import Timing
 
 _HOLD_MAX = 64  # longest run of data frames that is counted by itself
-_AFTER_SEARCH = 10  # tokens after a search in which a poll still looks for the one that was lost
-T_LATE_USE = 2 * T_NO_TOKEN
-"""So long a token that was given up may still be used, and the two that are there then last."""
-
-T_STOPPED = 1_000 * MS
-"""A search for a successor that takes so long has stopped the bus."""
 
 _TOKEN, _POLL, _POLL_REPLY, _TEST, _TEST_REPLY, _POSTPONED = map(
     int,  # plain numbers compare faster than members
@@ -59,14 +52,7 @@ _TOKEN, _POLL, _POLL_REPLY, _TEST, _TEST_REPLY, _POSTPONED = map(
     ),
 )
 
-
-@dataclass(slots=True)
-class _GivenUp:
-    """A station that did not use its token, who took the token back, and when it was sent."""
-
-    mac: int
-    by: int
-    token_end: int
+_ANSWERS = frozenset((_POLL_REPLY, _TEST_REPLY, _POSTPONED))
 
 
 class MstpRingObserver:
@@ -78,10 +64,8 @@ class MstpRingObserver:
         self._holder: int | None = None  # None: not known
         self._passed_by: int | None = None  # who passed the token to the holder, while the holder has not used it
         self._token: Frame | None = None  # that token, while unused
-        self._second: int | None = None  # who has another token, or was sent it, as far as seen
-        self._given_up: _GivenUp | None = None
+        self._second = SecondTokens(self._tally)
         self._repeated = RepeatedToken()
-        self._two_until = 0  # ns; two tokens until then are known of
         self._got: int | None = None  # when the holder got the token
         self._hold = 0  # data frames sent on this token
         self._doubt = True  # something may have been missed since the last good frame
@@ -91,7 +75,8 @@ class MstpRingObserver:
         self._missed: int | None = None  # where octets may be lost, until an event comes after it
         self._turn = Turn(timing)
         self._reads = HeldReads(self._least_gap)
-        self._questions = RingQuestions(self._tally, self._reads)
+        self._unheard = UnheardFrames(self._tally, self._least_gap)
+        self._questions = RingQuestions(self._tally, self._reads, self._unheard)
         self._storms = Storms()
 
     def see(self, no: int, event: FramerEvent, header: Header | None) -> None:
@@ -154,7 +139,7 @@ class MstpRingObserver:
         """No wait that began before it is measured to its end."""
         self._forget()
         self._missed, self._quiet_since = None, end
-        self._given_up = None
+        self._second.given_up = None
         self._repeated.forget()
         self._questions.forget()
         self._reads.forget()
@@ -206,14 +191,14 @@ class MstpRingObserver:
                 tally.note(RingEventKind.USED_BOTH, frame.start, no, slow, None, took)
         self._questions.holder = self._holder
         answers = self._questions.is_answer(no, frame, frame_type, source, destination, node)
-        self._check_addresses(no, frame, frame_type, source, destination)
+        check_addresses(tally, no, frame, frame_type, source, destination)
         if frame_type == _TOKEN:
             if not answers:
-                self._take_turn(no, frame, source, node)
+                self._take_turn(no, frame, source, node, header)
             self._pass_token(no, frame, source, destination, node)
         elif frame_type == _POLL:
             if not answers:
-                self._take_turn(no, frame, source, node)
+                self._take_turn(no, frame, source, node, header)
             self._poll(no, frame, source, destination, node)
         elif frame_type == _POLL_REPLY:
             node.poll_replies_sent += 1
@@ -224,7 +209,7 @@ class MstpRingObserver:
             node.postponed += 1
         elif frame_type != _TEST_REPLY:
             if not answers:
-                self._take_turn(no, frame, source, node)
+                self._take_turn(no, frame, source, node, header)
             if frame_type == _TEST:
                 self._questions.asked = AskedInRing(frame_type, source, destination, frame, no)
             elif frame_type in CARRIES_NPDU or frame_type >= PROPRIETARY:
@@ -273,26 +258,7 @@ class MstpRingObserver:
                 self._tally.node(destination).requests_received += 1
                 self._questions.asked = AskedInRing(frame_type, source, destination, frame, no)
         if header.kind == "i-am":
-            self._see_i_am(no, frame, source, node)
-
-    def _see_i_am(self, no: int, frame: Frame, source: int, node: NodeTally) -> None:
-        """Two devices that say I-Am from one address share it; those behind a router do not count."""
-        message = messages.read(frame)
-        if message is None or message.npdu is None or message.apdu is None or message.npdu.snet is not None:
-            return
-        if message.parameters[:1] != b"\xc4" or len(message.parameters) < 5:
-            return
-        instance = ObjectId.unpack(message.parameters[1:5]).instance
-        before, node.device = node.device, instance
-        if instance in node.devices:
-            if before not in (None, instance):
-                self._tally.note(RingEventKind.SECOND_DEVICE, frame.start, no, source, None, instance)
-            return
-        if len(node.devices) >= EVENTS_MAX:
-            return
-        node.devices.append(instance)
-        if len(node.devices) > 1:
-            self._tally.note(RingEventKind.OTHER_DEVICE, frame.start, no, source, None, instance)
+            see_i_am(self._tally, no, frame, source, node)
 
     # Who may send
 
@@ -312,11 +278,14 @@ class MstpRingObserver:
     def _lose_token(self, no: int, frame: Frame, source: int) -> None:
         tally = self._tally
         self._questions.give_up(no, frame, source)
-        if tally.edges:  # where no token was ever seen, none can be lost
+        if self._unheard.is_mute(self._holder):  # whatever it sends is silence here
+            tally.note(RingEventKind.UNHEARD, frame.start, no, self._holder, source)
+        elif frame.octets[2] in _ANSWERS:  # somebody had the token and asked
+            tally.note(RingEventKind.UNHEARD, frame.start, no, frame.octets[3], source)
+        elif tally.edges:  # where no token was ever seen, none can be lost
             holder = None if self._doubt or self._was_interrupted() else self._holder
             tally.note(RingEventKind.LOST_TOKEN, frame.start, no, holder, source, self._silence(frame))
-            tally.node(source).searches = True
-            tally.node(source).searching_since = frame.start
+            begin_search(tally.node(source), frame.start)
         self._forget()
 
     def _was_interrupted(self) -> bool:
@@ -327,7 +296,7 @@ class MstpRingObserver:
         before = self._before
         return before is not None and self._holder is not None and self._holder not in before.octets[3:5]
 
-    def _take_turn(self, no: int, frame: Frame, source: int, node: NodeTally) -> None:
+    def _take_turn(self, no: int, frame: Frame, source: int, node: NodeTally, header: Header) -> None:
         """A frame that only the holder of the token may send."""
         if source == self._holder:
             if self._token is not None:  # its first frame with this token, or the first that was not damaged
@@ -338,54 +307,102 @@ class MstpRingObserver:
                         self._late(RingEventKind.LATE_USE, no, frame, source, self._passed_by, gap)
                 self._token = self._passed_by = None
             return
+        if self._was_asked(no, frame, source, header):
+            return
         if source == self._passed_by:  # nobody used it: it is repeated, or somebody else is looked for
-            self._take_back(no, frame, source, node)
+            if not self._came_back(no, frame, source):
+                self._take_back(no, frame, source, node)
             return
         if self._is_known_second(no, frame, source):
             return
         if self._holder is not None and not self._doubt:
+            if self._was_unheard(no, frame, source, node):
+                return
             if self._is_slave(frame, source, node):
                 self._tally.note(RingEventKind.UNASKED, frame.start, no, source, self._holder)
                 self._token = None  # the time to its use is not its own any more
             else:
                 self._tally.note(RingEventKind.TWO_TOKENS, frame.start, no, source, self._holder)
-                self._second = source
+                self._second.of = source
             return
         self._forget()
         self._holder = source
+
+    def _came_back(self, no: int, frame: Frame, source: int) -> bool:
+        """Whether the token was used unheard, and is back: its sender goes on sooner than it may repeat it."""
+        token, holder = self._token, self._holder
+        if token is None or holder is None or self._doubt or frame.octets == token.octets:
+            return False
+        if frame.start - token.end + token.slack >= T_USAGE_TIMEOUT:
+            return False
+        if not self._unheard.passed_on(no, frame, token, holder, source):
+            return False
+        self._hold_unseen(source)
+        return True
 
     def _take_back(self, no: int, frame: Frame, source: int, node: NodeTally) -> None:
         """The station that passed the token sends again: the next one has not used it."""
         if self._holder is not None and frame.octets[2] != _TOKEN:
             token_end = frame.start if self._token is None else self._token.end
-            self._given_up = _GivenUp(self._holder, source, token_end)
+            self._second.given_up = GivenUp(self._holder, source, token_end)
             if frame.octets[2] == _POLL and not self._doubt:  # damage in between may have been its use
                 self._tally.note(RingEventKind.LEFT, frame.start, no, self._holder, source)
                 self._tally.node(self._holder).gone = True
             if frame.octets[2] == _POLL:
-                node.searches = True
-                node.searching_since = frame.start
+                begin_search(node, frame.start)
         self._holder = source
         self._passed_by = self._token = None
 
     def _is_known_second(self, no: int, frame: Frame, source: int) -> bool:
         """Whether another token is known of that this station has: its cause is told once."""
-        late = self._given_up
-        if late is not None and source == late.mac and frame.start - late.token_end <= T_LATE_USE:
-            gap = frame.start - late.token_end
-            self._given_up = None
-            self._tally.node(source).gone = False
-            if not self._doubt:
-                self._tally.note(RingEventKind.GIVEN_UP, frame.start, no, source, late.by, gap)
-            self._two_until = frame.end + T_LATE_USE
-            self._second = source
+        second = self._second
+        if second.uses_given_up(no, frame, source, self._doubt) or source == second.of:
             return True
-        if source == self._second:
-            return True
-        if frame.start < self._two_until:  # either may go on, or give way when it hears the other
+        if second.are_known(frame.start):
             self._holder, self._passed_by, self._token = source, None, None
             return True
         return False
+
+    def _was_unheard(self, no: int, frame: Frame, source: int, node: NodeTally) -> bool:
+        """Whether frames that the tap did not hear explain why this station sends, or it had the token all the time."""
+        before, holder = self._before, self._holder
+        assert before is not None
+        assert holder is not None
+        if self._is_slave(frame, source, node) and not self._unheard.is_mute(holder):
+            return False
+        if self._unheard.passed_on(no, frame, before, holder, source):
+            self._hold_unseen(source)
+            return True
+        if self._unheard.take_back(source):
+            self._hold_unseen(source)
+            self._second.of = holder
+            return True
+        return False
+
+    def _was_asked(self, no: int, frame: Frame, source: int, header: Header) -> bool:
+        """Whether it answers the holder of the token after all, or a question that was not heard.
+
+        Then who asked has the token, or must have got it.
+        """
+        before, holder, client = self._before, self._holder, header.destination
+        if before is None or holder is None or client is None or self._doubt:
+            return False
+        if client == holder and is_proprietary_answer(frame, before):
+            return True
+        if header.role is not Role.RESPONSE:
+            return False
+        if (source, client) in self._questions.postponed or is_second_answer(frame, before):
+            return False
+        if not self._unheard.asked(no, frame, before, holder, client, source):
+            return False
+        if client != holder:
+            self._hold_unseen(client)
+        return True
+
+    def _hold_unseen(self, holder: int) -> None:
+        """A station has the token, and it is not known since when."""
+        self._holder, self._passed_by, self._token, self._got = holder, None, None, None
+        self._second.of, self._hold = None, 0
 
     def _is_slave(self, frame: Frame, source: int, node: NodeTally) -> bool:
         """Whether it has never had a token, nor does what only masters do."""
@@ -402,7 +419,7 @@ class MstpRingObserver:
             node.next, edge.since, edge.streak = destination, frame.start, 0
         edge.streak += 1
         node.tokens_sent += 1
-        self._end_search(no, frame, source, node)
+        end_search(tally, no, frame, source, node)
         again = (
             before is not None
             and not self._doubt
@@ -423,35 +440,15 @@ class MstpRingObserver:
         self._hold = 0
         if source == destination:
             tally.note(RingEventKind.SELF_TOKEN, frame.start, no, source)
-        if source == self._second and source != self._holder:
-            self._second = destination
+        if source == self._second.of and source != self._holder:
+            self._second.of = destination
             return
         if source == self._holder and self._got is not None and not self._doubt:
             node.held += max(0, frame.end - self._got)
         self._got = frame.end
-        if self._given_up is not None and self._given_up.mac == destination:
-            self._given_up = None
+        self._second.passed(destination)
+        self._unheard.heard(destination)
         self._holder, self._passed_by, self._token = destination, source, frame
-
-    def _end_search(self, no: int, frame: Frame, source: int, node: NodeTally) -> None:
-        """The token goes on: what a loss has cost, and for how long polls still belong to it."""
-        if node.searches:
-            node.after_search = _AFTER_SEARCH
-        elif node.after_search:
-            node.after_search -= 1
-        node.searches = False
-        since, node.searching_since = node.searching_since, None
-        if since is not None and frame.start - since >= T_STOPPED:
-            value = frame.start - since
-            self._tally.note(RingEventKind.STOPPED, frame.start, no, source, node.highest_polled, value)
-
-    def _check_addresses(self, no: int, frame: Frame, frame_type: int, source: int, destination: int) -> None:
-        length = frame.octets[5] << 8 | frame.octets[6]
-        illegal = source == BROADCAST
-        if frame_type <= _POLL and (source > MAX_MASTER or destination > MAX_MASTER):
-            illegal = True
-        if illegal or (length > MAX_DATA and not is_encoded(frame_type)):
-            self._tally.note(RingEventKind.ILLEGAL, frame.start, no, source, destination, length)
 
     # Times
 
@@ -467,5 +464,6 @@ class MstpRingObserver:
 
     def _forget(self) -> None:
         self._questions.asked = None
-        self._holder = self._passed_by = self._token = self._second = self._got = None
+        self._holder = self._passed_by = self._token = self._second.of = self._got = None
         self._hold = 0
+        self._unheard.forget()

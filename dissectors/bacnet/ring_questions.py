@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections import OrderedDict, deque
 from dataclasses import dataclass
 
-from dissectors.bacnet.frame_types import CARRIES_NPDU, FrameType
+from dissectors.bacnet import message as messages
+from dissectors.bacnet.frame_types import CARRIES_NPDU, PROPRIETARY, FrameType
 from dissectors.bacnet.held_reads import HeldReads, surely_over
 from dissectors.bacnet.limits import MS, T_NO_TOKEN, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.message import data_of, more_follows
 from dissectors.bacnet.ring import RingEvent, RingEventKind
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
+from dissectors.bacnet.unheard import UnheardFrames
 from dissectors.frame import Frame
 
 _POSTPONED_MAX = 64
@@ -29,7 +31,10 @@ _NO_ANSWERS = frozenset(
 
 @dataclass(slots=True)
 class AskedInRing:
-    """The frame that waits for its answer. `missed`: it was counted as one that nobody answered."""
+    """The frame that waits for its answer.
+
+    `missed`: it was counted as one that nobody answered. `answered`: it must have been, though that was not heard.
+    """
 
     frame_type: int
     source: int
@@ -37,6 +42,7 @@ class AskedInRing:
     frame: Frame
     no: int
     missed: bool = False
+    answered: bool = False
 
 
 class RingQuestions:
@@ -46,13 +52,14 @@ class RingQuestions:
     `alone_since`: the earliest that the frame before may have begun, None where it has no time of its own.
     """
 
-    def __init__(self, tally: RingTally, reads: HeldReads) -> None:
+    def __init__(self, tally: RingTally, reads: HeldReads, unheard: UnheardFrames) -> None:
         self.asked: AskedInRing | None = None
         self.doubt = True
         self.holder: int | None = None
         self.alone_since: int | None = None
         self._tally = tally
         self._reads = reads
+        self._unheard = unheard
         self._unanswered: OrderedDict[tuple[int, int], AskedInRing] = OrderedDict()  # by server and client
         self._postponed: deque[tuple[int, int, int]] = deque(maxlen=_POSTPONED_MAX)  # server, client, end of request
 
@@ -84,7 +91,7 @@ class RingQuestions:
         if asked.frame_type == _POLL:
             self._unanswered_poll(asked, no, frame, source)
         else:
-            self._unanswered_request(asked)
+            self._unanswered_request(asked, frame)
 
     def end_postponed(self, frame: Frame, source: int, destination: int, node: NodeTally) -> None:
         """Data that may be the answer which was postponed."""
@@ -115,7 +122,7 @@ class RingQuestions:
                 self._tally.note(RingEventKind.OTHER_ECHO, frame.start, no, source)
             return answered
         if not back or frame_type in _NO_ANSWERS:
-            self._unanswered_request(asked)
+            self._unanswered_request(asked, frame)
             return False
         node.replies += 1
         node.reply.add(took)
@@ -126,6 +133,8 @@ class RingQuestions:
         return True
 
     def _unanswered_poll(self, asked: AskedInRing, no: int, frame: Frame, source: int) -> None:
+        if not self.doubt and self._unheard.poll_answered(asked.no, asked.frame, frame):
+            return
         node = self._tally.node(asked.source)
         self._tally.poll_waste += max(0, min(frame.start - asked.frame.start, T_NO_TOKEN))
         node.polls_unanswered += 1
@@ -150,7 +159,7 @@ class RingQuestions:
         if longest < T_USAGE_DELAY // 2:
             self._tally.note(RingEventKind.TOO_SOON, frame.start, no, asked.source, asked.destination, took)
 
-    def _unanswered_request(self, asked: AskedInRing) -> None:
+    def _unanswered_request(self, asked: AskedInRing, frame: Frame) -> None:
         if not asked.frame.ok:  # it may have been damaged for everybody
             return
         key = asked.destination, asked.source
@@ -158,7 +167,11 @@ class RingQuestions:
         self._unanswered.move_to_end(key)
         if len(self._unanswered) > _UNANSWERED_MAX:
             self._unanswered.popitem(last=False)
-        if not self.doubt and not more_follows(asked.frame):
+        if (
+            not self.doubt
+            and not more_follows(asked.frame)
+            and not self._unheard.answered(asked.no, asked.frame, frame)
+        ):
             asked.missed = True
             self._tally.note(RingEventKind.NO_REPLY, asked.frame.end, asked.no, asked.destination, asked.source)
 
@@ -172,5 +185,22 @@ class RingQuestions:
             return False
         if asked.missed:
             self._tally.take_back(RingEventKind.NO_REPLY, asked.no, source)
-        self._tally.note(RingEventKind.LATE_REPLY, frame.start, no, source, destination, took)
+        if not asked.answered and took > T_REPLY_DELAY:  # sooner is in time, however soon the other one went on
+            self._tally.note(RingEventKind.LATE_REPLY, frame.start, no, source, destination, took)
         return True
+
+
+def is_second_answer(frame: Frame, before: Frame) -> bool:
+    """Whether a frame answers the same question as the one before it, of the same station."""
+    if frame.octets[3:5] != before.octets[3:5]:
+        return False
+    first, second = messages.read(before), messages.read(frame)
+    if first is None or second is None or first.apdu is None or second.apdu is None:
+        return False
+    return first.apdu.is_answer and first.apdu.invoke_id == second.apdu.invoke_id
+
+
+def is_proprietary_answer(frame: Frame, before: Frame) -> bool:
+    """Whether a proprietary frame comes back for the one before it: whether that asks for one, only its maker knows."""
+    both = frame.octets[2] >= PROPRIETARY <= before.octets[2]
+    return both and frame.octets[3] == before.octets[4] and frame.octets[4] == before.octets[3]

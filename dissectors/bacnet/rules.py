@@ -47,8 +47,9 @@ _ALL = (
         "MS104",
         Severity.ERROR,
         "two tokens on the bus",
-        "A station sent although another one had the token, and nothing was damaged or missed before. At least twice, "
-        "and only where tokens are in the capture.",
+        "A station sent although another one had the token, and nothing was damaged or missed before; nor can it have "
+        "got the token in frames that the tap did not hear: they had no time, the token never goes that way, or the "
+        "other one went on too. At least twice, and only where tokens are in the capture.",
         "a second token after a disturbance, two stations with one address, or a ring joined while running",
         "the stations named: address switches, and whether two segments were joined",
         explains=("MS401", "MS402", "MS403", "LN101", "LN103", "LN2"),
@@ -198,7 +199,9 @@ _ALL = (
         Severity.WARNING,
         "error answer",
         "A station answers a request with Error, Reject or Abort (ASHRAE 135, clause 18), counted "
-        "by service, error class and code. A single one is only noted.",
+        "by service, error class and code. A single one is only noted; so is what a station says it has not where each "
+        "thing is asked for once, and, once for all, where each of several stations says so: somebody looks what there "
+        "is.",
         "the station heard the request well and refuses it; class and code say why",
         "object, property and service asked for, against what the device has; take what it has not out of the client",
     ),
@@ -219,7 +222,7 @@ _ALL = (
         "and three times as many as its share of the octets would bring if noise hit everybody alike.",
         "the sender's transceiver, its connection, or somebody who talks over it",
         "that station's connection, and its address",
-        explains=("MS401",),
+        explains=("MS401", "MS403", "LN101", "LN103", "LN2"),
     ),
     Rule(
         "MS403",
@@ -247,6 +250,18 @@ _ALL = (
         "its driver is switched off too early, before the last octet is out",
         "the turnaround or transmit-delay setting of that station, its firmware, its converter's direction control",
         explains=("MS401", "MS402", "MS102", "MS301", "LN101", "LN2"),
+    ),
+    Rule(
+        "MS406",
+        Severity.WARNING,
+        "not heard at this tap",
+        "Frames that must have been sent and are not in the capture: the station to which a token usually goes uses "
+        "it, and nobody repeats it or polls for another; an answer without its question; who asked goes on long before "
+        "it may give up. More than one frame in 100 and three at least, or a station of which nothing is heard at all; "
+        "less is noted. A second token, a lost answer or a station that is off would not look so.",
+        "the tap or its adapter loses frames, or is too weak there to hear the station; the bus itself works",
+        "the tap's place, its wires (both, and the ground), bias and termination there; the computer's load; take no "
+        "rates or lost answers from this capture",
     ),
     Rule(
         "MS501",

@@ -153,6 +153,19 @@ def swapped(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
     return session, items()
 
 
+def unheard(parties: Sequence[str], share: float, plan: Scenario, seconds: float, tap: TapModel) -> Heard:
+    """A tap that misses frames of some altogether, which everybody else hears; exact times."""
+    session, _ = simulate(plan, seconds, tap)
+    dice = Random(f"unheard {plan.seed}")
+
+    def items() -> Iterator[Item]:
+        for burst in plan.wire().run(int(seconds * S)):
+            if burst.octets and not (burst.sent[0].party in parties and dice.random() < share):
+                yield Chunk(burst.end, burst.octets, burst.marks)
+
+    return session, items()
+
+
 def losing(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
     """A computer that loses a read now and then, and says so."""
     session, items = simulate(plan, seconds, tap)

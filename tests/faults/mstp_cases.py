@@ -13,8 +13,9 @@ from dissectors.line import Timing
 from dissectors.simulated import Station
 from dissectors.simulated_faults import EarlyRelease, NoiseInGaps
 from sniff.simulation.tap import FTDI
-from tests.faults.buses import MSTP_LINE
+from tests.faults.buses import MSTP_LINE, mstp
 from tests.faults.case import Case, Said
+from tests.faults.hearing import unheard
 from tests.faults.misbehaving import Blinks, Trimmed, When
 from tests.faults.ring_nodes import (
     AnswersTests,
@@ -220,6 +221,35 @@ MSTP_CASES: tuple[Case, ...] = (
         (Said(("bus",), ("MS403", "LN203", "MS401", "LN202"), r"noise|stray"),),
         struck=("MAC 2", "MAC 5", "MAC 9"),  # who polls; nobody is at the addresses polled
         seconds=60,
+    ),
+    Case(
+        "MS/TP second token, FTDI",
+        partial(mstp, polls_every=12, node_faults={9: {"forges_every": 3}}),
+        (("MS104", "bus"),),
+        FTDI,
+        struck=("MAC 9",),
+        never=("MS406",),
+        seconds=30,
+        seeds=1,
+    ),
+    # what this tap alone does not hear
+    Case(
+        "MS/TP frames not heard here",
+        Ring(_four),
+        (("MS406", "bus"),),
+        hear=partial(unheard, ("mac 1", "mac 2", "mac 5", "mac 9"), 0.03),
+        never=("MS101", "MS104", "MS106", "MS301", "MS302"),
+        seconds=30,
+        seeds=2,
+    ),
+    Case(
+        "MS/TP one station not heard here",
+        Ring(_four),
+        (("MS406", "MAC 9"),),
+        hear=partial(unheard, ("mac 9",), 1.0),
+        never=("MS101", "MS104", "MS106", "MS301"),
+        seconds=20,
+        seeds=1,
     ),
     # who talks too much
     Case(

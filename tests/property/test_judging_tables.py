@@ -6,10 +6,14 @@ import random
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from dissectors.bacnet import bulk_ring_observer
+from dissectors.bacnet.envelope import npdu_frame
 from dissectors.columns import Reads
+from dissectors.findings import Severity
+from dissectors.frame import Chunk
 from dissectors.line import Timing
 from dissectors.profiles import Devices
 from dissectors.token_ring import WatchesColumns
@@ -21,7 +25,9 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Adapter, LineEvent, LineEventKind, Session
 from sniff.engine.table import Table
 from tests.bench import bulk_mstp, bulk_rtu
+from tests.dissectors.bacnet.ring_script import Step, data, rounds, token
 from tests.property import mstp_buses
+from tests.property.kernel_equality import reads_of
 from tests.seeds import seeds
 
 Bus = Callable[[float], tuple[Session, Reads]]
@@ -91,6 +97,17 @@ def _held_back(damaged: float) -> tuple[Session, Reads]:
     return replace(session, adapter=Adapter(latency=16_000_000)), replace(reads, times=times)
 
 
+def _unheard(damaged: float) -> tuple[Session, Reads]:
+    """One frame in 60 is not in the capture, nor any of station 5."""
+    session, reads = _mstp(damaged)
+    heard = np.random.default_rng(5).random(len(reads)) >= 1 / 60
+    sources = reads.octets[np.concatenate(([0], np.cumsum(reads.lengths)[:-1])) + 4]
+    heard &= sources != 5
+    octets = reads.octets[np.repeat(heard, reads.lengths)]
+    kept = {"times": reads.times[heard], "lengths": reads.lengths[heard], "marked": reads.marked[heard]}
+    return session, replace(reads, octets=octets, **kept)
+
+
 def _unanswered(damaged: float) -> tuple[Session, Reads]:
     return _mstp(damaged, answered=0.9)
 
@@ -103,7 +120,7 @@ def _rtu(damaged: float, timing: Timing = bulk_rtu.TIMING) -> tuple[Session, Rea
 
 
 @pytest.mark.parametrize("damaged", [0.0, 0.002, 0.03])
-@pytest.mark.parametrize("bus", [_mstp, _held_back, _unanswered, _rtu])
+@pytest.mark.parametrize("bus", [_mstp, _held_back, _unanswered, _unheard, _rtu])
 def test_a_long_bus_is_judged_from_tables_as_row_by_row(bus: Bus, damaged: float) -> None:
     session, reads = bus(damaged)
     items = list(tables([Block(reads)], session))
@@ -121,6 +138,44 @@ def test_stations_that_do_anything_are_judged_from_tables_as_row_by_row(seed: in
     dice = random.Random(seed)
     for most in (1 << 30, 100, 10):
         same(by_tables(items, judged(session), dice, most), expected)
+
+
+def chunks_of(steps: list[Step]) -> list[Chunk]:
+    now, chunks = mstp_buses.START, []
+    for silence, octets in steps:
+        now += int(silence * 1_000_000) + len(octets) * bulk_mstp.TIMING.char
+        chunks.append(Chunk(now, octets))
+    return chunks
+
+
+@pytest.mark.parametrize("names", [1, 8])
+def test_what_was_asked_for_is_known_in_tables_as_row_by_row(names: int) -> None:
+    """The request may be the last row of the table before its answer's."""
+    steps = rounds(9, 2, 5, 9)
+    for no in range(8):
+        asked = bytes.fromhex(f"010402750{no % 2}0c0c000000041 9{0x1C + no % names:02x}".replace(" ", ""))
+        refused = bytes.fromhex(f"0100500{no % 2}0c91029120")
+        steps += [(2, npdu_frame(9, 2, asked, True)), (9, npdu_frame(2, 9, refused, False)), *rounds(4, 2, 5, 9)]
+    session = Session("x", bulk_mstp.LINE, "mstp")
+    items = list(tables([Block(reads_of(chunks_of(steps)))], session))
+    expected = by_rows(items, judged(session))
+    (found,) = (one for one in expected.findings() if one.code == "MS305")
+    assert (found.severity is Severity.NOTE) == (names == 8)
+    dice = random.Random(2)
+    for most in (1 << 30, 1, 3, 20):
+        same(by_tables(items, judged(session), dice, most), expected)
+
+
+def test_a_token_that_was_not_heard_is_over_when_the_next_one_is() -> None:
+    """5 passed one on unheard, and much later sends without any: that is its second token, and not what was before."""
+    steps = [*rounds(20, 2, 5, 9), (2, token(2, 5)), (6, token(9, 2)), *rounds(20, 2, 5, 9)]
+    for _ in range(2):
+        steps += [(1.2, data(5, 255)), *rounds(20, 2, 5, 9)]
+    session = Session("x", bulk_mstp.LINE, "mstp")
+    items = list(tables([Block(reads_of(chunks_of(steps)))], session))
+    expected = by_rows(items, judged(session))
+    assert "MAC 5 sent twice" in str([one.seen for one in expected.findings()])
+    same(by_tables(items, judged(session), random.Random(1), 1 << 30), expected)
 
 
 def test_octets_lost_on_the_way_tear_the_same_transactions() -> None:

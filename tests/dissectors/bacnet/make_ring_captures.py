@@ -176,6 +176,19 @@ def after_an_empty_poll() -> list[Step]:
     return steps + rounds(3, 12, 31)
 
 
+def tokens_not_heard() -> list[Step]:
+    """The tap misses three tokens of 27: 61 goes on as after them, and nobody repeats or polls."""
+    steps: list[Step] = []
+    for _ in range(3):
+        steps += [*rounds(8, 8, 27, 61), (2, token(8, 27)), (6, token(61, 8))]
+    return steps + rounds(8, 8, 27, 61)
+
+
+def station_not_heard() -> list[Step]:
+    """27 is too weak here: 61 goes on as after its token, and nobody repeats or polls."""
+    return [(2, token(8, 27)), *[(6, token(61, 8)), (2, token(8, 27))] * 30]
+
+
 MADE = {
     "ms-tp-token-used-after-it-was-given-up": used_late,
     "ms-tp-token-and-its-repeat-both-used": used_twice,
@@ -194,6 +207,8 @@ MADE = {
     "ms-tp-broadcast-storm": storm,
     "ms-tp-one-uses-most-of-the-line": one_hog,
     "ms-tp-reads-held-back": held_read,
+    "ms-tp-tokens-not-heard": tokens_not_heard,
+    "ms-tp-station-not-heard": station_not_heard,
     "ms-tp-request-heard-damaged": request_damaged,
     "ms-tp-damage-after-a-poll-to-nobody": after_an_empty_poll,
 }
