@@ -66,7 +66,8 @@ class Passed:
     `times`: the newest response times of each station and pace, ns, in order. `pauses`: the master's newest, ns, each
     with the time since the request before. `sure`: answers that had no echo before them. `answered`: places of the
     newest exchanges that were answered, in order; `given_up`: of those that were not, `unanswered`: how long the
-    master waited for them, ns. `units`: stations that answered.
+    master waited for them, ns. `units`: stations that answered; `heard`: each of
+    them with the place of its last answer.
     """
 
     times: Mapping[tuple[int, int], Sequence[int]]
@@ -76,6 +77,7 @@ class Passed:
     units: frozenset[int]
     given_up: Sequence[int]
     unanswered: Sequence[int]
+    heard: Sequence[tuple[int, int]]
 
 
 def holding(
@@ -196,6 +198,9 @@ def passed(found: ExchangeColumns, frames: FrameColumns, place: int, end: int) -
     start = frames.start[found.request[at]]
     pause = np.maximum(start - frames.end[found.request[at - 1] + found.answered[at - 1]], 0)
     cycle = start - frames.start[found.request[at - 1]]
+    answers = np.flatnonzero(answered[::-1])
+    units, newest = np.unique(unit[::-1][answers], return_index=True)
+    backwards = answers[newest]
     return Passed(
         times,
         list(zip(pause.tolist(), cycle.tolist(), strict=True)),
@@ -204,4 +209,18 @@ def passed(found: ExchangeColumns, frames: FrameColumns, place: int, end: int) -
         frozenset(np.flatnonzero(np.bincount(unit[answered])).tolist()),
         (place + np.flatnonzero(found.unanswered[part])[-GIVEN_UP:]).tolist(),
         found.gap[part][found.unanswered[part]][-SAMPLES:].tolist(),
+        list(zip(units.tolist(), (end - 1 - backwards).tolist(), strict=True)),
     )
+
+
+def first_try(found: ExchangeColumns, at: int, place: int, tx: int) -> int | None:
+    """The transaction that an exchange repeats, if it does, where those from `place` on go by as transaction `tx` …"""
+    first = at
+    while first > place and found.repeat[first]:
+        first -= 1
+    return tx + first - place if first < at else None
+
+
+def heard(found: ExchangeColumns, went: Passed, place: int, tx: int) -> dict[int, tuple[int, int]]:
+    """Of each unit the transaction that it answered last, and the first one of which that was a repeat."""
+    return {unit: (tx + at - place, first_try(found, at, place, tx) or tx + at - place) for unit, at in went.heard}
