@@ -19,6 +19,7 @@ SAME_KEPT = 8
 """Requests of a station whose answers are compared with each other."""
 
 _BLOCKS = 64
+_NEARLY_ALL = 4  # of five
 
 Key = tuple[str, int | None]
 """A request as a poll list has it: kind and first register."""
@@ -129,6 +130,7 @@ class Requested:
 
     turns: int = 0
     tries: int = 0
+    echoed: int = 0  # of them, given back whole
     missing: Tally = field(default_factory=Tally)
 
 
@@ -139,19 +141,25 @@ class Lost:
     unit: int
     key: Key
     no: int
+    is_unheard: bool = False
+    is_waited_for: bool = False
 
 
 @dataclass(slots=True)
 class StationRecord:
-    """One station. `missing`: no octet followed. `silent`: those since its last sign of life."""
+    """One station. `missing`: no octet followed. `silent`: those since its last sign of life. `unheard`: of those that
+    are missing such after which the master went on as after an answer."""
 
     asked: int = 0
     answered: int = 0
     missing: Tally = field(default_factory=Tally)
     silent: Tally = field(default_factory=Tally)
+    unheard: Tally = field(default_factory=Tally)
     damaged: Tally = field(default_factory=Tally)
     cut: int = 0  # of the damaged answers: ended early
     last_octet: Tally = field(default_factory=Tally)  # only the last octet is wrong
+    first_lost: Tally = field(default_factory=Tally)  # only the first octet is wrong; when: ns after the request
+    wrong_check: Tally = field(default_factory=Tally)  # but for the check nothing is wrong, and no line error
     talked_over: Tally = field(default_factory=Tally)  # begun as an answer, and longer than it can be
     outlasting: Tally = field(default_factory=Tally)  # the same, and not over when the master gave up
     excess: list[int] = field(default_factory=list)  # octets by which those were too long
@@ -170,6 +178,7 @@ class StationRecord:
     twice: Tally = field(default_factory=Tally)
     repeats: Tally = field(default_factory=Tally)
     repeats_cost: int = 0  # ns
+    waited_for: int = 0  # of the missing, those that the master surely waited for
     waited: int = 0  # ns, that the master spent on requests that nothing followed
     last_start: int = 0  # of its newest request
     last_heard: int | None = None
@@ -185,6 +194,12 @@ class StationRecord:
         """How many damaged answers are no damage of the line: always the same, or always in the same way."""
         flawed = sum(tally.count for tally in self.flaws.values() if tally.count >= 3)
         return flawed + (self.garbage.tally.count if self.garbage.is_system else 0)
+
+    @property
+    def is_unheard(self) -> bool:
+        """Whether its answers were missed here: the master went on as after an answer, and asked hardly ever again."""
+        unheard, repeats = self.unheard.count, self.repeats.count
+        return 0 < self.missing.count <= 2 * unheard and _NEARLY_ALL * max(self.waited_for, repeats) <= unheard
 
     @property
     def turns(self) -> int:
@@ -210,7 +225,7 @@ class StationRecord:
         """Keep an answer beside the others to exactly the same request; the first SAME_KEPT requests only."""
         same = self.same_request(key, request)
         if same is not None:
-            same.answers.append(answer)
+            same.add((answer,))
 
     def same_request(self, key: Key, request: bytes) -> SameRequest | None:
         """The answers to exactly the same request, those to come included; None beyond SAME_KEPT requests."""
@@ -233,7 +248,9 @@ class StationRecord:
     def forgive(self, lost: Lost) -> None:
         """The request was answered, after its master had given up: it is not lost as well."""
         request = self.requests.get(lost.key)
-        for tally in (self.missing, request.missing if request is not None else None):
+        unheard = self.unheard if lost.is_unheard else None
+        self.waited_for -= lost.is_waited_for
+        for tally in (self.missing, unheard, request.missing if request is not None else None):
             if tally is not None and tally.count:
                 tally.count -= 1
                 if lost.no in tally.evidence:
@@ -267,6 +284,10 @@ class Cycles:
         if periods is None:
             periods = self._periods[octets] = deque(maxlen=256)
         periods.append(start - before)
+
+    def asked_of(self, unit: int) -> list[bytes]:
+        """What a unit is asked."""
+        return [octets for octets in self._last if octets[:1] == bytes((unit,))]
 
     def usual(self) -> tuple[int, Key, list[int]] | None:
         """Unit and kind of the request with the most periods, and those in ascending order; None where none repeats."""
