@@ -308,8 +308,9 @@ class ModbusFindings(Remembered):
         """How a damaged answer of a station, in that row, ended."""
         station = self.station(unit)
         station.cut += frame.damage is Damage.SHORT
-        if frame.damage is Damage.CHECK and not frame.marks and frame.expected in (None, len(frame.octets)):
-            station.wrong_check.add(frame.end, no)
+        check = rtu_check(frame) if frame.protocol == RTU_NAME and frame.damage is Damage.CHECK else None
+        if check is not None and not frame.marks:
+            station.wrong_check(check[0] ^ check[1], len(frame.octets)).add(frame.end, no)
         if _ends_badly(frame):
             station.last_octet.add(frame.end, no)
 

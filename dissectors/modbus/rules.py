@@ -126,10 +126,11 @@ _ALL = (
         Severity.WARNING,
         "check octets swapped",
         "Answers whose check is right once its two octets change places: at least three, and most of the station's "
-        "damaged answers. RTU sends the low octet of the CRC first (Modbus over Serial Line V1.02, 2.5.1.2).",
+        "damaged answers. RTU sends the low octet of the CRC first (Modbus over Serial Line V1.02, 2.5.1.2). An error "
+        "of the master where all its requests are so: nobody answers them.",
         "the device sends its check the wrong way round; what it says is sound",
         "the device's firmware; a master that is told to take the check so can read it",
-        explains=_OF_DAMAGE,
+        explains=("MB009", "LN003", *_OF_DAMAGE),
     ),
     Rule(
         "MB012",
@@ -242,8 +243,9 @@ _ALL = (
         "MB021",
         Severity.WARNING,
         "check always wrong",
-        "A station of which no good answer was heard: 19 in 20, at least five, are whole, without a line error, and "
-        "only their check is wrong. Noise changes lengths too, and never all.",
+        "A station of which no good answer was heard, and answers without a line error whose check alone is wrong: at "
+        "least five, and 3 in 4 of the damaged ones, differ from the right one in the same bits as others of their "
+        "length. Noise changes other bits each time; a check with another start value, or over fewer octets, these.",
         "the device computes its check otherwise: another start value or polynomial, or over other octets",
         "the device's firmware; whether a converter on the way changes octets",
         explains=("MB001", *_OF_DAMAGE),

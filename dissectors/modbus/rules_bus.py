@@ -180,6 +180,8 @@ def _of_requests(seen: BusRecord) -> Iterator[Finding]:
         if tally.count >= _CUT_LEAST and 2 * tally.count >= seen.damaged_requests.count:
             words = f"{counted(tally.count, 'request')} good but for one thing: {flaw.value}"
             severity = note_if(seen.rare(tally.count, seen.requests))
+            if tally.count == seen.requests:
+                words, severity = f"{words}, every time", Severity.ERROR  # no station can answer
             yield tally.found(RULES[FLAWS[flaw]], "master", words, severity)
 
 

@@ -33,6 +33,7 @@ FLAWS = {
 
 _NOT_THERE = (1, 2, 3)  # exceptions that tell a program that tries what a device can do
 _PROBED = 8  # times that something else is asked for each try
+_NEARLY_ALL_LEAST = 10  # damaged answers
 _WRONG_CHECKS = 5  # answers, at least
 _SYSTEM_LEAST = 3  # of one kind, before it is a system
 _EXCESS_SPREAD = 2  # octets
@@ -159,7 +160,14 @@ def _damaged(seen: BusRecord, name: str, station: StationRecord, is_common: bool
     low, high = wilson(damaged.count, station.asked)
     if station.asked >= 20:
         words += f"; that is {low:.1%} to {high:.1%} of all, with 95% confidence"
-    yield damaged.found(RULES["MB005"], name, words, note_if(rare or is_common))
+    finding = damaged.found(RULES["MB005"], name, words, note_if(rare or is_common))
+    if damaged.count >= _NEARLY_ALL_LEAST and 10 * damaged.count >= 9 * station.asked:  # noise leaves some
+        finding = replace(
+            finding,
+            means=f"{finding.means}; or two stations with this address, whose answers fall on each other",
+            next=f"switch the station off and see whether something still answers; {finding.next}",
+        )
+    yield finding
 
 
 def _twice(name: str, station: StationRecord, words: str, slow: bool) -> Finding:
@@ -195,13 +203,17 @@ def _flawed(seen: BusRecord, name: str, station: StationRecord) -> Iterator[Find
 
 def _miscounted(name: str, station: StationRecord) -> Finding | None:
     """Checks that are always wrong, in frames that are right otherwise."""
-    wrong = station.wrong_check
-    flawed = sum(tally.count for tally in station.flaws.values())
-    few = wrong.count < _WRONG_CHECKS or 20 * wrong.count < 19 * station.asked
-    if few or station.times.count or 2 * flawed > wrong.count:
+    always: dict[int, Tally] = {}  # the commonest difference among frames of one length
+    for (_, octets), tally in station.wrong_checks.items():
+        if octets and (octets not in always or tally.count > always[octets].count):
+            always[octets] = tally
+    same = [tally for tally in always.values() if tally.count >= _SYSTEM_LEAST]
+    count, flawed = sum(tally.count for tally in same), sum(tally.count for tally in station.flaws.values())
+    few = count < _WRONG_CHECKS or 4 * count < 3 * station.damaged.count
+    if few or station.times.count or 2 * flawed > count:
         return None
-    words = f"{wrong.count} of {counted(station.asked, 'answer')} right but for the check, without a line error"
-    return wrong.found(RULES["MB021"], name, words)
+    words = f"{count} of {counted(station.asked, 'answer')} right but for the check, which always differs alike"
+    return replace(max(same, key=lambda tally: tally.count).found(RULES["MB021"], name, words), count=count)
 
 
 def _foreign(seen: BusRecord, name: str, station: StationRecord) -> Finding | None:

@@ -19,6 +19,7 @@ SAME_KEPT = 8
 """Requests of a station whose answers are compared with each other."""
 
 _BLOCKS = 64
+_CHECKS_KEPT = 64
 _NEARLY_ALL = 4  # of five
 
 Key = tuple[str, int | None]
@@ -159,7 +160,7 @@ class StationRecord:
     cut: int = 0  # of the damaged answers: ended early
     last_octet: Tally = field(default_factory=Tally)  # only the last octet is wrong
     first_lost: Tally = field(default_factory=Tally)  # only the first octet is wrong; when: ns after the request
-    wrong_check: Tally = field(default_factory=Tally)  # but for the check nothing is wrong, and no line error
+    wrong_checks: dict[tuple[int, int], Tally] = field(default_factory=dict)  # by difference, and octets of the frame
     talked_over: Tally = field(default_factory=Tally)  # begun as an answer, and longer than it can be
     outlasting: Tally = field(default_factory=Tally)  # the same, and not over when the master gave up
     excess: list[int] = field(default_factory=list)  # octets by which those were too long
@@ -214,6 +215,13 @@ class StationRecord:
                 key = ("other requests", None)
             request = self.requests.setdefault(key, Requested())
         return request
+
+    def wrong_check(self, difference: int, octets: int) -> Tally:
+        """The record of answers whose check differs so, without a line error; one for others beyond _CHECKS_KEPT."""
+        kind = difference, octets
+        if kind not in self.wrong_checks and len(self.wrong_checks) >= _CHECKS_KEPT:
+            kind = 0, 0
+        return self.wrong_checks.setdefault(kind, Tally())
 
     def exception(self, key: Key, code: int) -> Tally:
         """The record of one exception to one kind of request; beyond KEYS_KEPT, one for all others."""

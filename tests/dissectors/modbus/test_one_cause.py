@@ -112,6 +112,15 @@ def test_a_check_that_is_wrong_now_and_then_is_damage(bus):
     assert graves_of(bus) == {("MB005", "station 3")}
 
 
+@pytest.mark.parametrize(("good", "is_said"), [(0, True), (1, False)])
+def test_where_every_answer_is_damaged_two_stations_are_thought_of(bus, good, is_said):
+    for turn in range(16):
+        bus.say(read(3)).damage(values(3, turn), at=2 + turn % 5)
+        polls(bus, 1, (1, 2, *(3,) * good))
+    means = [one.means for one in findings_of(bus) if one.code == "MB005"]
+    assert ["two stations" in one for one in means] == [is_said]
+
+
 def first_lost(bus, slow):
     for turn in range(8):
         for unit in (2, 3, 4):
