@@ -16,7 +16,7 @@ from dissectors.modbus.ascii_kernel import rtu_twins
 from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, readable_adu
 from dissectors.modbus.exchange import Exchange, Seen
 from dissectors.modbus.exchange_columns import exchanges, placed
-from dissectors.modbus.exchange_memory import first_try, heard, holding, passed
+from dissectors.modbus.exchange_memory import heard, holding, passed
 from dissectors.modbus.tracker import ModbusTracker, PassedBy
 from dissectors.tracker import Tracker
 
@@ -95,7 +95,6 @@ class ModbusBlockPairing:
         for one in sorted({*went.answered, *went.given_up, end - 1}):
             request = Exchange(tx + one - place, self._seen(int(found.request[one]), to_number), bool(found.sure[one]))
             request.answered = bool(found.answered[one])
-            request.of = first_try(found, one, place, tx)
             request.waited = int(found.gap[one]) if found.unanswered[one] else None
             made[one] = request
         if found.copy[end - 1]:

@@ -213,14 +213,14 @@ def passed(found: ExchangeColumns, frames: FrameColumns, place: int, end: int) -
     )
 
 
-def first_try(found: ExchangeColumns, at: int, place: int, tx: int) -> int | None:
-    """The transaction that an exchange repeats, if it does, where those from `place` on go by as transaction `tx` …"""
-    first = at
-    while first > place and found.repeat[first]:
-        first -= 1
-    return tx + first - place if first < at else None
-
-
 def heard(found: ExchangeColumns, went: Passed, place: int, tx: int) -> dict[int, tuple[int, int]]:
-    """Of each unit the transaction that it answered last, and the first one of which that was a repeat."""
-    return {unit: (tx + at - place, first_try(found, at, place, tx) or tx + at - place) for unit, at in went.heard}
+    """Of each unit the transaction that it answered last, and the first one that waited with that, where the exchanges
+    from `place` on go by as transaction `tx` and those behind it."""
+    return {unit: (tx + at - place, tx + _since(found, at, place) - place) for unit, at in went.heard}
+
+
+def _since(found: ExchangeColumns, at: int, place: int) -> int:
+    """Place of the first of the requests to one unit that waited one directly behind the other, the last at `at`."""
+    while at > place and found.unanswered[at - 1] and found.unit[at - 1] == found.unit[at]:
+        at -= 1
+    return at

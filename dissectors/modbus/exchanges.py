@@ -27,8 +27,8 @@ class Exchanges:
 
     `last`: the exchange that closed last. `answered`, `given_up`: the newest of each. `chain`: equal requests before
     the open one, whose verdicts wait for it. `closed`: by the event under way. `only`: what all frames so far say;
-    empty when they differ. `heard`: of each unit, the transaction that it answered last, and the first one of which
-    that was a repeat.
+    empty when they differ. `heard`: of each unit, the transaction that it answered last, and the first one that waited
+    with that.
     """
 
     def __init__(self, learnt: LearnedTiming, echoes: Echoes) -> None:
@@ -133,7 +133,7 @@ class Exchanges:
     def note_answer(self, request: Exchange) -> None:
         """The request was answered."""
         request.answered = True
-        self.heard[request.unit] = request.tx, request.of or request.tx
+        self.heard[request.unit] = request.tx, request.since
 
     def _close_doubt(self, request: Exchange, verdict: Verdict) -> None:
         if verdict is Verdict.ANSWERED:
@@ -166,7 +166,7 @@ class Exchanges:
         """The newest request given up lately that this answer fits.
 
         A station answers in the order in which it was asked: once it has answered a later request, it owes this answer
-        no more. Of a repeat nobody knows which of the tries it answered.
+        no more. Which of several it answered that came one directly behind the other, nobody knows.
         """
         timeout = self._learnt.timeout
         for request in reversed(self.given_up):
@@ -181,7 +181,7 @@ class Exchanges:
 
     def _owes(self, request: Exchange) -> bool:
         answered, first = self.heard.get(request.unit, (0, 0))
-        return answered < request.tx or first == (request.of or request.tx)
+        return request.tx > answered or request.tx >= first
 
     def repeats(self, request: Exchange, seen: Seen) -> Exchange | None:
         """The request answered lately that an answer fits which comes sooner than the station has ever answered."""

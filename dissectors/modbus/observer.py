@@ -310,7 +310,7 @@ class ModbusFindings(Remembered):
         station.cut += frame.damage is Damage.SHORT
         check = rtu_check(frame) if frame.protocol == RTU_NAME and frame.damage is Damage.CHECK else None
         if check is not None and not frame.marks:
-            station.wrong_check(check[0] ^ check[1], len(frame.octets)).add(frame.end, no)
+            station.wrong_check(check[0] ^ check[1], len(frame.octets)).add(frame.end, no, check[1])
         if _ends_badly(frame):
             station.last_octet.add(frame.end, no)
 

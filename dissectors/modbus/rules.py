@@ -106,11 +106,10 @@ _ALL = (
         "MB009",
         Severity.WARNING,
         "damaged requests",
-        "Requests that arrive damaged at this tap. A station ignores such a request, so it also goes unanswered; where "
-        "they are answered, only this tap hears them so.",
+        "Requests that arrive damaged at this tap. A station ignores such a request, so it also goes unanswered.",
         "noise near the master or the tap, a second master, or a driver of the master that switches too late",
         "the master's connection, termination there, and whether a second master is on the bus",
-        explains=("MB104", "MB207", "LN101"),
+        explains=("MB104",),
     ),
     Rule(
         "MB010",
@@ -245,10 +244,21 @@ _ALL = (
         "check always wrong",
         "A station of which no good answer was heard, and answers without a line error whose check alone is wrong: at "
         "least five, and 3 in 4 of the damaged ones, differ from the right one in the same bits as others of their "
-        "length. Noise changes other bits each time; a check with another start value, or over fewer octets, these.",
+        "length that say something else, or as a check does that begins with 0. Noise changes other bits each time.",
         "the device computes its check otherwise: another start value or polynomial, or over other octets",
         "the device's firmware; whether a converter on the way changes octets",
         explains=("MB001", *_OF_DAMAGE),
+    ),
+    Rule(
+        "MB022",
+        Severity.WARNING,
+        "requests damaged here alone",
+        "Requests that arrive damaged at this tap and are answered all the same, more of them than of those that are "
+        "not answered. A note where there are few, or answers are damaged as well.",
+        "noise at this tap, or a signal of the master too weak here; where it was heard worse still, the answers seem "
+        "to come unasked",
+        "this tap's place, its ground and its wires to the line; whether the master's reads fail at all",
+        explains=("MB207", "LN101"),
     ),
     Rule(
         "MB101",

@@ -112,9 +112,9 @@ def _damaged_here(seen: BusRecord, requests: int) -> Iterator[Finding]:
     """Requests that only this tap hears damaged, since they were answered."""
     damaged, others = seen.damaged_here, sum(station.damaged.count for station in seen.stations.values())
     if damaged.count:
-        words = f"{damaged.count} of {counted(requests, 'request')} damaged at this tap, and answered all the same"
+        words = f"{damaged.count} of {counted(requests, 'request')} damaged here, and answered all the same"
         rare = seen.rare(damaged.count, requests) or 4 * others > damaged.count
-        yield damaged.found(RULES["MB009"], "master", words, note_if(rare))
+        yield damaged.found(RULES["MB022"], "bus", words, note_if(rare))
 
 
 def _cut_by_master(seen: BusRecord) -> Iterator[Finding]:

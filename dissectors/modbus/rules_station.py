@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
+from dissectors.checksums import crc16_modbus
 from dissectors.findings import EVIDENCE_MAX, Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Flaw
 from dissectors.late_speakers import reaching
@@ -204,9 +205,11 @@ def _flawed(seen: BusRecord, name: str, station: StationRecord) -> Iterator[Find
 def _miscounted(name: str, station: StationRecord) -> Finding | None:
     """Checks that are always wrong, in frames that are right otherwise."""
     always: dict[int, Tally] = {}  # the commonest difference among frames of one length
-    for (_, octets), tally in station.wrong_checks.items():
-        if octets and (octets not in always or tally.count > always[octets].count):
-            always[octets] = tally
+    for (difference, octets), wrong in station.wrong_checks.items():
+        begun_with_0 = difference == int.from_bytes(crc16_modbus(bytes(octets - 2)).to_bytes(2, "little"), "big")
+        is_system = octets and (len(wrong.right) > 1 or begun_with_0)  # the same octets again may be spoilt alike
+        if is_system and (octets not in always or wrong.tally.count > always[octets].count):
+            always[octets] = wrong.tally
     same = [tally for tally in always.values() if tally.count >= _SYSTEM_LEAST]
     count, flawed = sum(tally.count for tally in same), sum(tally.count for tally in station.flaws.values())
     few = count < _WRONG_CHECKS or 4 * count < 3 * station.damaged.count

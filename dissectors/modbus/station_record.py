@@ -147,6 +147,20 @@ class Lost:
 
 
 @dataclass(slots=True)
+class WrongCheck:
+    """Answers of one length whose check differs from the right one in the same bits. `right`: two of the right ones."""
+
+    tally: Tally = field(default_factory=Tally)
+    right: set[int] = field(default_factory=set)
+
+    def add(self, time: int, no: int, right: int) -> None:
+        """Take the next one."""
+        self.tally.add(time, no)
+        if len(self.right) < 2:
+            self.right.add(right)
+
+
+@dataclass(slots=True)
 class StationRecord:
     """One station. `missing`: no octet followed. `silent`: those since its last sign of life. `unheard`: of those that
     are missing such after which the master went on as after an answer."""
@@ -160,7 +174,7 @@ class StationRecord:
     cut: int = 0  # of the damaged answers: ended early
     last_octet: Tally = field(default_factory=Tally)  # only the last octet is wrong
     first_lost: Tally = field(default_factory=Tally)  # only the first octet is wrong; when: ns after the request
-    wrong_checks: dict[tuple[int, int], Tally] = field(default_factory=dict)  # by difference, and octets of the frame
+    wrong_checks: dict[tuple[int, int], WrongCheck] = field(default_factory=dict)  # by difference, and length of frame
     talked_over: Tally = field(default_factory=Tally)  # begun as an answer, and longer than it can be
     outlasting: Tally = field(default_factory=Tally)  # the same, and not over when the master gave up
     excess: list[int] = field(default_factory=list)  # octets by which those were too long
@@ -216,12 +230,12 @@ class StationRecord:
             request = self.requests.setdefault(key, Requested())
         return request
 
-    def wrong_check(self, difference: int, octets: int) -> Tally:
+    def wrong_check(self, difference: int, octets: int) -> WrongCheck:
         """The record of answers whose check differs so, without a line error; one for others beyond _CHECKS_KEPT."""
         kind = difference, octets
         if kind not in self.wrong_checks and len(self.wrong_checks) >= _CHECKS_KEPT:
             kind = 0, 0
-        return self.wrong_checks.setdefault(kind, Tally())
+        return self.wrong_checks.setdefault(kind, WrongCheck())
 
     def exception(self, key: Key, code: int) -> Tally:
         """The record of one exception to one kind of request; beyond KEYS_KEPT, one for all others."""

@@ -53,7 +53,7 @@ _QUIET_NOISE = frozenset((Reason.ZEROS, Reason.BREAK, Reason.PAD))
 class PassedBy:
     """Exchanges that went by the tracker. `first`: the request of the first. `newest`: the last that were answered, and
     the last of all; `given_up`: the last that were not. `heard`: of each unit that answered, its last transaction and
-    the first of which that was a repeat. `count`: of all. `end`: ns, of the last frame. `units`: that were asked.
+    the first that waited with it. `count`: of all. `end`: ns, of the last frame. `units`: that were asked.
     """
 
     first: Seen
@@ -148,6 +148,8 @@ class ModbusTracker:
         request = Exchange(self._held.take_tx(), seen, sure, fault=fault)
         request.silent = is_listen_only(seen.octets) or (request.unit in self._mute and is_restart(seen.octets))
         if before is not None:
+            if before.unit == request.unit:
+                request.since = before.since
             if before.octets == seen.octets and not (before.fault or before.silent):
                 request.attempt, request.of = before.attempt + 1, before.of or before.tx
             before.waited = waited = before.gap(seen.frame.start)

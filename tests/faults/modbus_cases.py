@@ -12,7 +12,7 @@ from dissectors.simulated_faults import BitFlips, Break, CutShort, LateResponse,
 from sniff.simulation.tap import CH340, FTDI, UART
 from tests.faults.buses import RTU_LINE, modbus
 from tests.faults.case import Case, Said
-from tests.faults.hearing import echoing, hidden_latency, of_party, sent_otherwise, unheard
+from tests.faults.hearing import echoing, hidden_latency, noisy_tap, of_party, sent_otherwise, unheard
 from tests.faults.misbehaving import (
     Rewrites,
     SpoiltFirst,
@@ -182,6 +182,14 @@ MODBUS_CASES: tuple[Case, ...] = (
         hear=partial(unheard, ("unit 3",), 1.0),
         never=("MB001", "MB003"),
         seeds=1,
+    ),
+    Case(
+        "RTU requests damaged here alone",
+        modbus,
+        (("MB022", "bus"),),
+        hear=partial(noisy_tap, "master", 0.08),
+        never=("MB001",),
+        seeds=2,
     ),
     # answers that do not fit, requests that are wrong
     Case(

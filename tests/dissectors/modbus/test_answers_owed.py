@@ -53,3 +53,8 @@ def test_the_answer_to_a_request_that_was_damaged_is_no_second_answer(bus, left)
 def test_a_second_answer_directly_behind_the_first_is_one(bus):
     bus.say("02030400030005", 2)
     assert bus.run().last.verdict.value == "answered-twice"
+
+
+def test_of_two_requests_directly_behind_one_another_both_are_owed(bus):
+    bus.say(ONE).say("010300100002", 1).say(VALUES, 4).say(VALUES, 8)
+    assert "late" in bus.run().verdicts
