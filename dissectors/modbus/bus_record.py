@@ -178,10 +178,6 @@ class BusRecord:
             return sorted(silent)
         return once if len(once) >= _SCAN_LEAST else []
 
-    def is_scanned(self, unit: int) -> bool:
-        """Whether an address is one of those."""
-        return unit in self.scanned()
-
     def too_close(self, sender: str, time: int, before: int, no: int) -> None:
         """Note a frame that began too soon after the one before."""
         calls = self.close.setdefault(sender, [])

@@ -12,7 +12,7 @@ from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.damage_shares import DamageShare, shares_of_damage, to_blame
 from dissectors.modbus.finding_words import note_if, request_words, units
 from dissectors.modbus.rules import RULES
-from dissectors.modbus.rules_station import FLAWS, is_absent, of_station
+from dissectors.modbus.rules_station import FLAWS, is_absent, of_missing, of_station
 from dissectors.modbus.rules_unheard import of_unheard
 from dissectors.words import duration, fine_milliseconds
 
@@ -28,9 +28,9 @@ _COMMON_LEAST = 3
 
 def judge(seen: BusRecord, timeout: int | None) -> tuple[Finding, ...]:
     """All findings: the bus first, then station by station. `timeout`: the master's, ns, None while unlearnt."""
-    damage = shares_of_damage(seen)
+    damage, scanned, unheard = shares_of_damage(seen), seen.scanned(), seen.unheard()
     made = [
-        *_of_bus(seen, "master" in damage.blamed),
+        *_of_bus(seen, "master" in damage.blamed, scanned, unheard),
         *_of_masters(seen),
         *_of_gaps(seen),
         *_of_ends(seen),
@@ -38,14 +38,17 @@ def judge(seen: BusRecord, timeout: int | None) -> tuple[Finding, ...]:
         *_of_late_speakers(seen),
     ]
     for unit in sorted(seen.stations):
-        made += of_station(seen, unit, seen.stations[unit], timeout, f"station {unit}" not in damage.blamed)
+        station = seen.stations[unit]
+        if unit not in unheard:
+            made += of_missing(seen, unit, station, unit in scanned)
+        made += of_station(seen, unit, station, timeout, f"station {unit}" not in damage.blamed)
     return tuple(made)
 
 
 # ---- the bus
 
 
-def _of_bus(seen: BusRecord, is_blamed: bool) -> Iterator[Finding]:
+def _of_bus(seen: BusRecord, is_blamed: bool, scanned: list[int], unheard: list[int]) -> Iterator[Finding]:
     requests = sum(station.asked for station in seen.stations.values()) + seen.damaged_requests.count
     damaged = seen.damaged_requests
     if damaged.count:
@@ -57,7 +60,6 @@ def _of_bus(seen: BusRecord, is_blamed: bool) -> Iterator[Finding]:
         yield from _damaged_here(seen, requests)
     yield from _cut_by_master(seen)
     yield from _of_requests(seen)
-    scanned, unheard = seen.scanned(), seen.unheard()
     if scanned:
         most = max(seen.stations[unit].turns for unit in scanned)
         often = "once" if most == 1 else f"up to {times(most)}"

@@ -47,8 +47,6 @@ def of_station(
     seen: BusRecord, unit: int, station: StationRecord, timeout: int | None, is_common: bool
 ) -> Iterator[Finding]:
     name = f"station {unit}"
-    if not station.is_unheard and unit not in seen.unheard():
-        yield from _missing(seen, name, unit, station)
     foreign = _foreign(seen, name, station)
     miscounted = None if foreign else _miscounted(name, station)
     systematic = [*_flawed(seen, name, station), *(one for one in (foreign, miscounted) if one)]
@@ -76,12 +74,13 @@ def of_station(
         )
 
 
-def _missing(seen: BusRecord, name: str, unit: int, station: StationRecord) -> Iterator[Finding]:
-    missing = station.missing
+def of_missing(seen: BusRecord, unit: int, station: StationRecord, is_scanned: bool) -> Iterator[Finding]:
+    """Requests to a station that nothing answered. `is_scanned`: they were those of a search."""
+    name, missing = f"station {unit}", station.missing
     if not missing.count:
         return
     if is_absent(station):
-        if missing.count > 1 and not seen.is_scanned(unit):
+        if missing.count > 1 and not is_scanned:
             words = f"no answer to any of {station.asked} requests"
             stray = station.damaged.count
             words += f"; octets that are no good answer followed {times(stray)}" if stray else ""
@@ -89,7 +88,7 @@ def _missing(seen: BusRecord, name: str, unit: int, station: StationRecord) -> I
         else:
             again = f", sent {times(missing.count)}" if missing.count > 1 else ""
             words = f"no answer to the only request{again}"
-            if not seen.is_scanned(unit):
+            if not is_scanned:
                 yield missing.found(RULES["MB001"], name, words, Severity.NOTE)
         return
     silent = station.silent
