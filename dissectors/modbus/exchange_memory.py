@@ -213,14 +213,16 @@ def passed(found: ExchangeColumns, frames: FrameColumns, place: int, end: int) -
     )
 
 
-def heard(found: ExchangeColumns, went: Passed, place: int, tx: int) -> dict[int, tuple[int, int]]:
-    """Of each unit the transaction that it answered last, and the first one that waited with that, where the exchanges
-    from `place` on go by as transaction `tx` and those behind it."""
-    return {unit: (tx + at - place, tx + _since(found, at, place) - place) for unit, at in went.heard}
+def heard(went: Passed, place: int, tx: int) -> dict[int, int]:
+    """Of each unit the transaction that it answered last, where the exchanges from `place` on go by as `tx` and on."""
+    return {unit: tx + at - place for unit, at in went.heard}
 
 
-def _since(found: ExchangeColumns, at: int, place: int) -> int:
-    """Place of the first of the requests to one unit that waited one directly behind the other, the last at `at`."""
-    while at > place and found.unanswered[at - 1] and found.unit[at - 1] == found.unit[at]:
-        at -= 1
-    return at
+def outlives(found: ExchangeColumns, at: int, end: int) -> bool:
+    """Whether an exchange before `end` was not answered, and one directly behind it with the same unit was."""
+    unit = found.unit[at]
+    while found.unanswered[at] and at + 1 < end and found.unit[at + 1] == unit:
+        at += 1
+        if found.answered[at]:
+            return True
+    return False

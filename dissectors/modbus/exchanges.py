@@ -27,8 +27,7 @@ class Exchanges:
 
     `last`: the exchange that closed last. `answered`, `given_up`: the newest of each. `chain`: equal requests before
     the open one, whose verdicts wait for it. `closed`: by the event under way. `only`: what all frames so far say;
-    empty when they differ. `heard`: of each unit, the transaction that it answered last, and the first one that waited
-    with that.
+    empty when they differ. `heard`: of each unit, the transaction that it answered last.
     """
 
     def __init__(self, learnt: LearnedTiming, echoes: Echoes) -> None:
@@ -42,7 +41,7 @@ class Exchanges:
         self.answered: deque[Exchange] = deque(maxlen=4)
         self.given_up: deque[Exchange] = deque(maxlen=8)
         self.chain: list[Exchange] = []
-        self.heard: dict[int, tuple[int, int]] = {}
+        self.heard: dict[int, int] = {}
         self.only: bytes | None = None
 
     @property
@@ -56,9 +55,7 @@ class Exchanges:
         """The number that the next transaction will have."""
         return self._next_tx
 
-    def pass_by(
-        self, newest: list[Exchange], given_up: list[Exchange], heard: dict[int, tuple[int, int]], count: int
-    ) -> None:
+    def pass_by(self, newest: list[Exchange], given_up: list[Exchange], heard: dict[int, int], count: int) -> None:
         """So many transactions went by; `newest`: the last exchanges that were answered, and the last of all; `heard`:
         of each unit that answered, as here."""
         self.heard |= heard
@@ -133,7 +130,9 @@ class Exchanges:
     def note_answer(self, request: Exchange) -> None:
         """The request was answered."""
         request.answered = True
-        self.heard[request.unit] = request.tx, request.since
+        self.heard[request.unit] = request.tx
+        for before in self.given_up:
+            before.outlives |= before.unit == request.unit and request.since <= before.tx < request.tx
 
     def _close_doubt(self, request: Exchange, verdict: Verdict) -> None:
         if verdict is Verdict.ANSWERED:
@@ -180,8 +179,7 @@ class Exchanges:
         return None
 
     def _owes(self, request: Exchange) -> bool:
-        answered, first = self.heard.get(request.unit, (0, 0))
-        return request.tx > answered or request.tx >= first
+        return request.outlives or request.tx > self.heard.get(request.unit, 0)
 
     def repeats(self, request: Exchange, seen: Seen) -> Exchange | None:
         """The request answered lately that an answer fits which comes sooner than the station has ever answered."""

@@ -52,14 +52,14 @@ _QUIET_NOISE = frozenset((Reason.ZEROS, Reason.BREAK, Reason.PAD))
 @dataclass(frozen=True, slots=True)
 class PassedBy:
     """Exchanges that went by the tracker. `first`: the request of the first. `newest`: the last that were answered, and
-    the last of all; `given_up`: the last that were not. `heard`: of each unit that answered, its last transaction and
-    the first that waited with it. `count`: of all. `end`: ns, of the last frame. `units`: that were asked.
+    the last of all; `given_up`: the last that were not. `heard`: of each unit that answered, the last transaction that
+    it did. `count`: of all. `end`: ns, of the last frame. `units`: that were asked.
     """
 
     first: Seen
     newest: list[Exchange]
     given_up: list[Exchange]
-    heard: dict[int, tuple[int, int]]
+    heard: dict[int, int]
     count: int
     end: int
     units: set[int]
@@ -430,9 +430,9 @@ class ModbusTracker:
 
     def _answer(self, request: Exchange, seen: Seen, why: str | None) -> Placement:
         self._learn_from_answer(request, seen, why)
-        self._held.note_answer(request)
         self._held.answered.append(request)
         self._held.drop_chain(Verdict.NO_RESPONSE)
+        self._held.note_answer(request)
         self._held.open, self._held.last = None, request
         self._mute.discard(seen.octets[0])
         self._held.closed.append(request.close_with(seen, why))

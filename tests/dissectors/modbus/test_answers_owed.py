@@ -60,3 +60,8 @@ def test_a_second_answer_directly_behind_the_first_is_one(bus):
 def test_of_two_requests_directly_behind_one_another_both_are_owed(bus):
     bus.say(ONE).say("010300100002", 1).say(VALUES, 4).say(VALUES, 8)
     assert "late" in bus.run().verdicts
+
+
+def test_the_second_answer_to_what_was_asked_twice_is_late_whatever_came_between(bus):
+    bus.say(ONE).say(ONE, 120).say(VALUES, 30).exchange("010400000002", "01040400010002").say(VALUES, 30)
+    assert bus.run().last.verdict.value == "late"
