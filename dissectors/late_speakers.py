@@ -227,7 +227,7 @@ def told(one: LateSpeaker) -> str:
     words += f"; hit: {' and '.join(hits)}" if hits else ""
     shown = one.window.shown.total()
     words += f"; {times(shown)} the octets show that two spoke at once" if shown else ""
-    return words if one.is_sure else f"{words}; those that are hit were hardly heard elsewhere, so it may be theirs"
+    return words if one.is_sure else f"{words}; those that are hit were hardly heard elsewhere, to compare"
 
 
 def reaching(finding: Finding, late: LateSpeakers) -> Finding:

@@ -14,6 +14,8 @@ from dissectors.modbus.station_record import Key
 LONGEST_READ = 11
 """Octets: no RTU request that reads is longer, and what is stuck to it by noise."""
 
+_USUAL_ANSWER = 8  # octets of an answer of unknown length, RTU
+
 
 @dataclass(frozen=True, slots=True)
 class AskedRequest:
@@ -52,6 +54,11 @@ class AskedRequest:
             return b""
         begin = self.octets[:HEAD] + bytes((length - HEAD - 1 - CHECK,))
         return b"" if self.octets.startswith(begin) else begin
+
+    def answer_time(self, char: int) -> int:
+        """ns that its answer lasts, where a character takes `char`."""
+        octets = answer_length(self.octets + bytes(CHECK)) or _USUAL_ANSWER
+        return char * (2 * octets + 1 if self.frame.protocol == ASCII_NAME else octets)
 
     @property
     def is_for_nobody(self) -> bool:

@@ -16,7 +16,7 @@ from dissectors.modbus.ascii_kernel import rtu_twins
 from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, readable_adu
 from dissectors.modbus.exchange import Exchange, Seen
 from dissectors.modbus.exchange_columns import exchanges, placed
-from dissectors.modbus.exchange_memory import holding, passed
+from dissectors.modbus.exchange_memory import heard, holding, outlives, passed
 from dissectors.modbus.tracker import ModbusTracker, PassedBy
 from dissectors.tracker import Tracker
 
@@ -95,6 +95,8 @@ class ModbusBlockPairing:
         for one in sorted({*went.answered, *went.given_up, end - 1}):
             request = Exchange(tx + one - place, self._seen(int(found.request[one]), to_number), bool(found.sure[one]))
             request.answered = bool(found.answered[one])
+            request.outlives = outlives(found, one, end)
+            request.waited = int(found.gap[one]) if found.unanswered[one] else None
             made[one] = request
         if found.copy[end - 1]:
             made[end - 1].copied = int(found.gap[end - 1])
@@ -102,6 +104,7 @@ class ModbusBlockPairing:
             first=self._seen(int(found.request[place]), to_number),
             newest=[one for at, one in made.items() if at in went.answered or at == end - 1],
             given_up=[made[at] for at in went.given_up],
+            heard=heard(went, place, tx),
             count=end - place,
             end=int(self._frames.end[self._last[end - 1]]),
             units=set(np.flatnonzero(np.bincount(found.unit[place:end])).tolist()) - {0},

@@ -9,12 +9,18 @@ from dataclasses import dataclass, field
 from dissectors.findings import Tally
 from dissectors.frame import Flaw
 from dissectors.late_speakers import LateSpeakers
-from dissectors.line import NS_PER_S, Timing
+from dissectors.line import MS, NS_PER_S, Timing
 from dissectors.modbus.station_record import Cycles, StationRecord
 from dissectors.strikes import Strikes
 
 _SENDERS_KEPT = 300
 _SCAN_LEAST = 4
+_SEARCHES = 3  # times that a search goes through all addresses, and different requests that it makes
+_SCAN_AGAIN, _SCAN_ALONE = 8, 20  # addresses of a search that goes on, beside polling and by itself
+_CUT_LEAST, _CUT_OFTEN = 3, 6  # stations, and their answers, without their first octet
+_AGAIN_KEPT, _AGAIN_LEAST = 256, 8
+_AGAIN_SOON = 150 * MS  # hardly a master repeats sooner
+_UNHEARD_LEAST = 3
 _CLOSE_KEPT = 4096
 _LATE_KEPT = 4096
 
@@ -31,6 +37,24 @@ def _unknown(unit: int) -> bool:
 
 
 @dataclass(slots=True)
+class Again:
+    """Requests that were answered when they came a second time. `further`: those of which that was not enough; `after`:
+    ns from the first time to the second, of some; `units`: who answered."""
+
+    tally: Tally = field(default_factory=Tally)
+    further: int = 0
+    after: list[int] = field(default_factory=list)
+    units: set[int] = field(default_factory=set)
+
+    def add(self, unit: int, time: int, after: int, *frames: int | None) -> None:
+        """Take the next one."""
+        self.tally.add(time, *frames)
+        self.units.add(unit)
+        if len(self.after) < _AGAIN_KEPT:
+            self.after.append(after)
+
+
+@dataclass(slots=True)
 class BusRecord:
     """What was seen on the bus. Times are ns.
 
@@ -38,6 +62,9 @@ class BusRecord:
     before, time, frame before, frame). `broken_in`: the same of
     damaged frames that begin as a request to another station. `close`, `paused`, `bare_ends`: by sender; of the first,
     (time, frame before, frame). `bare_ends`: ASCII frames without their LF.
+    `damaged_here`: damaged requests that were answered all the same.
+    `again`: requests that were answered when they came a second time.
+    `crossed`: answers to the request before the newest, which came sooner than a turn takes.
     `asked_twice`: second answers to requests that were heard twice, one directly behind the other.
     `malformed`: requests that contradict themselves, with the exceptions they got. `to_nobody`: reads of address 0, and
     who answered. `cut_echoes`: requests given back in part. `octets`, `frames`: of each sender ("master", "station 3").
@@ -54,10 +81,13 @@ class BusRecord:
     answers: int = 0
     echoes: int = 0
     stations: dict[int, StationRecord] = field(default_factory=dict)
+    damaged_here: Tally = field(default_factory=Tally)
     damaged_requests: Tally = field(default_factory=Tally)
     strikes: Strikes = field(default_factory=Strikes)  # "master", "station 3" …
     late_speakers: LateSpeakers = field(default_factory=LateSpeakers)
     unasked: Tally = field(default_factory=Tally)
+    again: Again = field(default_factory=Again)
+    crossed: Tally = field(default_factory=Tally)
     asked_twice: Tally = field(default_factory=Tally)
     answers_to_broadcast: Tally = field(default_factory=Tally)
     noise_after_broadcast: Tally = field(default_factory=Tally)
@@ -93,15 +123,60 @@ class BusRecord:
         """Whether a pause inside a frame is the sender's: a busy computer goes well over what its adapter may add."""
         return PAUSE_MARGIN * self.timing.latency <= self.timing.t15
 
-    def scanned(self) -> list[int]:
-        """Addresses that were tried once and are nobody's, where the master tried so many that it was searching."""
-        tried = [unit for unit, station in self.stations.items() if not station.answered and station.turns == 1]
-        silent = [unit for unit in tried if self.stations[unit].missing.count == self.stations[unit].asked]
-        return sorted(silent) if len(silent) >= _SCAN_LEAST else []
+    @property
+    def repeated_after(self) -> int | None:
+        """After how long, ns, each request comes a second time and is answered then: a relay's doing.
 
-    def is_scanned(self, unit: int) -> bool:
-        """Whether an address is one of those."""
-        return unit in self.scanned()
+        None where a master may repeat, which asks some things only once, others three times, and waits longer.
+        """
+        again, answered = self.again, sum(station.answered for station in self.stations.values())
+        if len(again.units) < 2 or 10 * again.tally.count < 9 * max(answered, _AGAIN_LEAST):
+            return None
+        if _AGAIN_LEAST * again.further > again.tally.count:
+            return None
+        after = sorted(again.after)
+        low, usual, high = (after[len(after) * part // 10] for part in (1, 5, 9))
+        steady = high - low <= usual // 10 + self.timing.latency + 2 * MS
+        return usual if steady and usual < _AGAIN_SOON else None
+
+    @property
+    def cut_by_master(self) -> list[int]:
+        """Stations whose first octet is lost as a rule, where these are several and all that answer so soon."""
+        cut = [unit for unit, one in self.stations.items() if 2 * one.first_lost.count >= max(one.asked, _CUT_OFTEN)]
+        latest = max((self.stations[unit].first_lost.last for unit in cut), default=0)
+        others = [one for unit, one in self.stations.items() if unit not in cut and one.times.count]
+        return sorted(cut) if len(cut) >= _CUT_LEAST and all(_usual(one) > latest for one in others) else []
+
+    def unheard(self) -> list[int]:
+        """Stations whose answers this tap missed, by what the master did: all, where none is heard of any."""
+        asked = {unit: one for unit, one in self.stations.items() if one.missing.count >= _UNHEARD_LEAST}
+        if len(asked) > 1 and not any(one.repeats.count for one in asked.values()) and self.hears_nobody:
+            return sorted(asked)
+        return sorted(unit for unit, one in self.stations.items() if one.is_unheard)
+
+    @property
+    def hears_nobody(self) -> bool:
+        """Whether nothing was heard that a station may have sent."""
+        heard = any(one.last_heard is not None or one.undecided.count for one in self.stations.values())
+        return not (heard or self.answers or self.echoes)
+
+    def scanned(self) -> list[int]:
+        """Addresses that were tried seldom and are nobody's, where the master tried so many that it was searching.
+
+        Once each, or again and again: then beside others that it asks far more often, or so many that nobody has them.
+        """
+        silent = {
+            unit: station.turns
+            for unit, station in self.stations.items()
+            if not station.answered and 0 < station.turns <= _SEARCHES and station.missing.count == station.asked
+        }
+        once = sorted(unit for unit, turns in silent.items() if turns == 1)
+        most = max(silent.values(), default=0)
+        busiest = max((station.turns for station in self.stations.values() if station.answered), default=0)
+        least = _SCAN_AGAIN if busiest >= _SEARCHES * most else _SCAN_ALONE
+        if len(silent) >= least and len({key for unit in silent for key in self.stations[unit].requests}) <= _SEARCHES:
+            return sorted(silent)
+        return once if len(once) >= _SCAN_LEAST else []
 
     def too_close(self, sender: str, time: int, before: int, no: int) -> None:
         """Note a frame that began too soon after the one before."""
@@ -126,3 +201,9 @@ class BusRecord:
         """Whether so few are not worth a warning: one, or under 1 in 100 and at most two a minute."""
         minutes = max(1, -(-self.span // (60 * NS_PER_S)))
         return count == 1 or (count <= 2 * minutes and 100 * count < of)
+
+
+def _usual(station: StationRecord) -> int:
+    """The median response time of a station that has answered, ns."""
+    median = station.times.median()
+    return 0 if median is None else median.nominal

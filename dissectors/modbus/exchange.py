@@ -46,6 +46,9 @@ class Exchange:
     nothing. `copied`: response time of a copy taken for the answer, until the next frame confirms it. `copies`: frames
     that are each its answer or a request again, in the order they came. `after_broadcast`: it says the same as the
     broadcast directly before it. `may_be_answer`: it has the shape of an answer, and a request may have been missed.
+    `since`: the first request to this unit that waited with it, one directly behind the other.
+    `outlives`: it was given up, and one directly behind it answered: which of the two, nobody knows.
+    `waited`: ns, until the next request came, where that closed it.
     """
 
     tx: int
@@ -64,11 +67,15 @@ class Exchange:
     copies: list[Seen] = field(default_factory=list)
     after_broadcast: bool = False
     may_be_answer: bool = False
+    waited: int | None = None
+    since: int = 0
+    outlives: bool = False
     octets: bytes = field(init=False)  # unit and PDU of the request
     unit: int = field(init=False)  # the unit asked, 0 … 255
     end: int = field(init=False)  # of the request, ns
 
     def __post_init__(self) -> None:
+        self.since = self.since or self.tx
         self.octets = self.request.octets
         self.unit = self.octets[0] if self.octets else 0
         self.end = self.request.frame.end

@@ -66,7 +66,8 @@ class Passed:
     `times`: the newest response times of each station and pace, ns, in order. `pauses`: the master's newest, ns, each
     with the time since the request before. `sure`: answers that had no echo before them. `answered`: places of the
     newest exchanges that were answered, in order; `given_up`: of those that were not, `unanswered`: how long the
-    master waited for them, ns. `units`: stations that answered.
+    master waited for them, ns. `units`: stations that answered; `heard`: each of
+    them with the place of its last answer.
     """
 
     times: Mapping[tuple[int, int], Sequence[int]]
@@ -76,6 +77,7 @@ class Passed:
     units: frozenset[int]
     given_up: Sequence[int]
     unanswered: Sequence[int]
+    heard: Sequence[tuple[int, int]]
 
 
 def holding(
@@ -196,6 +198,9 @@ def passed(found: ExchangeColumns, frames: FrameColumns, place: int, end: int) -
     start = frames.start[found.request[at]]
     pause = np.maximum(start - frames.end[found.request[at - 1] + found.answered[at - 1]], 0)
     cycle = start - frames.start[found.request[at - 1]]
+    answers = np.flatnonzero(answered[::-1])
+    units, newest = np.unique(unit[::-1][answers], return_index=True)
+    backwards = answers[newest]
     return Passed(
         times,
         list(zip(pause.tolist(), cycle.tolist(), strict=True)),
@@ -204,4 +209,20 @@ def passed(found: ExchangeColumns, frames: FrameColumns, place: int, end: int) -
         frozenset(np.flatnonzero(np.bincount(unit[answered])).tolist()),
         (place + np.flatnonzero(found.unanswered[part])[-GIVEN_UP:]).tolist(),
         found.gap[part][found.unanswered[part]][-SAMPLES:].tolist(),
+        list(zip(units.tolist(), (end - 1 - backwards).tolist(), strict=True)),
     )
+
+
+def heard(went: Passed, place: int, tx: int) -> dict[int, int]:
+    """Of each unit the transaction that it answered last, where the exchanges from `place` on go by as `tx` and on."""
+    return {unit: tx + at - place for unit, at in went.heard}
+
+
+def outlives(found: ExchangeColumns, at: int, end: int) -> bool:
+    """Whether an exchange before `end` was not answered, and one directly behind it with the same unit was."""
+    unit = found.unit[at]
+    while found.unanswered[at] and at + 1 < end and found.unit[at + 1] == unit:
+        at += 1
+        if found.answered[at]:
+            return True
+    return False

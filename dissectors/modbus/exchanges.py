@@ -15,6 +15,9 @@ from dissectors.tracker import Transaction, Verdict
 GIVE_UP = 5 * NS_PER_S
 """An unanswered request is closed after 5 s of nothing while the master's timeout is unlearnt."""
 
+_LATE = 3  # times what the master waited, within which an answer may still come
+_WAITED_LEAST = 50_000_000  # ns; no master gives up sooner, it only seems so where an answer was missed
+
 FIRST_SEEN = "the first frame of the capture: perhaps an answer whose request came before"
 """The remark on a first request that has the shape of an answer."""
 
@@ -24,7 +27,7 @@ class Exchanges:
 
     `last`: the exchange that closed last. `answered`, `given_up`: the newest of each. `chain`: equal requests before
     the open one, whose verdicts wait for it. `closed`: by the event under way. `only`: what all frames so far say;
-    empty when they differ.
+    empty when they differ. `heard`: of each unit, the transaction that it answered last.
     """
 
     def __init__(self, learnt: LearnedTiming, echoes: Echoes) -> None:
@@ -38,6 +41,7 @@ class Exchanges:
         self.answered: deque[Exchange] = deque(maxlen=4)
         self.given_up: deque[Exchange] = deque(maxlen=8)
         self.chain: list[Exchange] = []
+        self.heard: dict[int, int] = {}
         self.only: bytes | None = None
 
     @property
@@ -51,8 +55,10 @@ class Exchanges:
         """The number that the next transaction will have."""
         return self._next_tx
 
-    def pass_by(self, newest: list[Exchange], given_up: list[Exchange], count: int) -> None:
-        """So many transactions went by; `newest`: the last exchanges that were answered, and the last of all."""
+    def pass_by(self, newest: list[Exchange], given_up: list[Exchange], heard: dict[int, int], count: int) -> None:
+        """So many transactions went by; `newest`: the last exchanges that were answered, and the last of all; `heard`:
+        of each unit that answered, as here."""
+        self.heard |= heard
         self.answered.extend([exchange for exchange in newest if exchange.answered])
         self.given_up.extend(given_up)
         self.last, self.only = newest[-1], b""
@@ -121,10 +127,17 @@ class Exchanges:
         else:
             self._close_doubt(request, verdict)
 
+    def note_answer(self, request: Exchange) -> None:
+        """The request was answered."""
+        request.answered = True
+        self.heard[request.unit] = request.tx
+        for before in self.given_up:
+            before.outlives |= before.unit == request.unit and request.since <= before.tx < request.tx
+
     def _close_doubt(self, request: Exchange, verdict: Verdict) -> None:
         if verdict is Verdict.ANSWERED:
             answer = request.copies[0]
-            request.answered = True
+            self.note_answer(request)
             self._learnt.answered(request.unit, request.pace, request.gap(answer.frame.start))
             self.closed.append(request.close_with(answer, None))
             return
@@ -149,14 +162,24 @@ class Exchanges:
         return tx
 
     def late_for(self, seen: Seen) -> Exchange | None:
-        """The newest request given up lately that this answer fits."""
-        patience = 3 * (self._learnt.timeout or GIVE_UP)
+        """The newest request given up lately that this answer fits.
+
+        A station answers in the order in which it was asked: once it has answered a later request, it owes this answer
+        no more. Which of several it answered that came one directly behind the other, nobody knows.
+        """
+        timeout = self._learnt.timeout
         for request in reversed(self.given_up):
-            if request.gap(seen.frame.start) > patience:
-                return None
-            if request.is_for(seen.octets) and mismatch(request.octets, seen.octets) is None:
+            waited = GIVE_UP if request.waited is None else max(request.waited, _WAITED_LEAST)
+            if request.gap(seen.frame.start) > _LATE * (timeout or waited):
+                if timeout is not None:
+                    return None
+                continue
+            if self._owes(request) and request.is_for(seen.octets) and mismatch(request.octets, seen.octets) is None:
                 return request
         return None
+
+    def _owes(self, request: Exchange) -> bool:
+        return request.outlives or request.tx > self.heard.get(request.unit, 0)
 
     def repeats(self, request: Exchange, seen: Seen) -> Exchange | None:
         """The request answered lately that an answer fits which comes sooner than the station has ever answered."""

@@ -18,6 +18,7 @@ READ, WRITE = 0, 1
 
 _PACES_KEPT = 1024
 _ANSWER_CHARS = 32  # of an answer as long as most
+_USUAL_PAUSES = 3
 _MARGIN = 2_000_000  # of a host clock: no limit is finer than 2 ms
 UNLEARNT_LIMIT = 100_000_000
 """A copy of a request within 100 ms is its answer while nothing is learnt: hardly a master gives up so soon. Later
@@ -94,6 +95,20 @@ class LearnedTiming:
         if 2 * max(self._pauses) > 3 * min(self._pauses) + 2 * self._margin:
             return False  # it pauses as it likes
         return abs(pause - gap) <= self._margin or (pause >= gap and self._is_pause(pause - gap))
+
+    def turn(self, unit: int, answer: int) -> tuple[int, int] | None:
+        """From the end of a request to the next, where an answer of `answer` ns comes: at least, and at most as a rule.
+
+        None while unlearnt. A unit that takes longer than most is held to what most take: a wait for it may be in vain.
+        """
+        if len(self._pauses) < _USUAL_PAUSES or not self._times:
+            return None
+        usual = {key: sorted(times)[len(times) // 2] for key, times in self._times.items()}
+        everybody = sorted(usual.values())[(len(usual) - 1) // 2]
+        response = min(usual.get((unit, READ), everybody), everybody)
+        pauses = sorted(self._pauses)
+        pause = pauses[3 * len(pauses) // 4]
+        return response // 2 + answer, (response + pause) * 5 // 4 + answer + self._margin
 
     def _sends_by_the_clock(self, cycle: int) -> bool:
         return len(self._pauses) < 2 or any(self.is_same(cycle, one) for one in self._cycles)

@@ -102,7 +102,11 @@ class ModbusFindings(Remembered):
                 self.seen.echoes += 1
                 self.copied.append(transaction.of)
                 if transaction.station is not None:
-                    self.station(transaction.station).echoed += 1
+                    station = self.station(transaction.station)
+                    station.echoed += 1
+                    original = self.asked.get(transaction.of or 0)
+                    if original is not None and original.header.role is Role.REQUEST:
+                        station.request(original.key).echoed += 1
             if verdict is Verdict.BROADCAST and asked is not None:
                 self.seen.cycles.add(asked.octets, asked.key, transaction.start)
             return
@@ -113,6 +117,9 @@ class ModbusFindings(Remembered):
             return
         if ended is not None:
             self._see_end(*ended)
+            if asked is not None and flaw in (Flaw.FIRST_MISSING, Flaw.FIRST_SPOILT):
+                waited = max(0, ended[2].start - asked.frame.end)
+                self.station(ended[0]).first_lost.add(waited, asked.no, ended[1])
         if verdict is Verdict.DAMAGED_REQUEST:
             octets = asked.frame.octets if asked is not None else b""
             self.seen.strikes.struck("master")
@@ -154,7 +161,7 @@ class ModbusFindings(Remembered):
             damaged = verdict is Verdict.DAMAGED_ANSWER and asked.no not in self.no_requests
             if damaged:
                 self._see_hit(transaction, asked, stray)
-            self.settle_request(station, transaction, asked, code, answer)
+            self.settle_request(station, transaction, asked, code, answer, is_disturbed=bool(stray))
             if damaged:
                 self._settle_damaged(station, transaction, asked, stray, flaw)
 
@@ -224,6 +231,10 @@ class ModbusFindings(Remembered):
         if before.header.role is not Role.REQUEST:  # a write has the shape of its answer, which may have come late
             return
         self.learnt.unanswered(gap)
+        turn = self.learnt.turn(before.unit, before.answer_time(self.timing.char))
+        if turn is not None:
+            kind = self.hasty if gap < turn[0] else self.unheard if gap <= turn[1] else self.waited_for
+            kind.append(before.no)
         self.waits[before.no] = gap
         if len(self.waits) > LOST_KEPT:
             del self.waits[next(iter(self.waits))]
@@ -297,6 +308,9 @@ class ModbusFindings(Remembered):
         """How a damaged answer of a station, in that row, ended."""
         station = self.station(unit)
         station.cut += frame.damage is Damage.SHORT
+        check = rtu_check(frame) if frame.protocol == RTU_NAME and frame.damage is Damage.CHECK else None
+        if check is not None and not frame.marks:
+            station.wrong_check(check[0] ^ check[1], len(frame.octets)).add(frame.end, no, check[1])
         if _ends_badly(frame):
             station.last_octet.add(frame.end, no)
 
@@ -326,9 +340,16 @@ class ModbusFindings(Remembered):
         self.seen.unasked.add(transaction.start, transaction.response)
 
     def settle_request(
-        self, station: StationRecord, transaction: Transaction, asked: AskedRequest, code: int | None, answer: bytes
+        self,
+        station: StationRecord,
+        transaction: Transaction,
+        asked: AskedRequest,
+        code: int | None,
+        answer: bytes,
+        is_disturbed: bool = False,
     ) -> None:
-        """A request that closed, with its answer, the code of its exception, or neither."""
+        """A request that closed, with its answer, the code of its exception, or neither. `is_disturbed`: octets
+        that are no good frame came before the answer."""
         verdict = transaction.verdict
         if asked.no in self.no_requests:
             return
@@ -346,6 +367,11 @@ class ModbusFindings(Remembered):
             request.turns += 1
             self.seen.cycles.add(asked.octets, asked.key, transaction.start)
         else:
+            after = transaction.start - station.last_start
+            if transaction.attempt == 2 and verdict in (Verdict.RETRY, Verdict.EXCEPTION):
+                self.seen.again.add(asked.unit, transaction.start, after, transaction.request, transaction.response)
+            else:
+                self.seen.again.further += 1
             station.repeats.add(transaction.start, transaction.request)
             station.repeats_cost += max(0, transaction.start - station.last_start)
         station.last_start = transaction.start
@@ -354,10 +380,16 @@ class ModbusFindings(Remembered):
             request.missing.add(transaction.start, transaction.request)
             station.missing.add(transaction.start, transaction.request)
             station.silent.add(transaction.start, transaction.request)
-            self.seen.late_speakers.unanswered(
-                asked.unit, asked.due, transaction.start, transaction.end, self.learnt.timeout
-            )
-            self.lost[transaction.id] = Lost(asked.unit, asked.key, asked.no)
+            is_unheard = asked.no in self.unheard
+            if is_unheard:
+                station.unheard.add(transaction.start, transaction.request)
+            elif asked.no not in self.hasty:  # who did not wait for it cannot have been spoken into
+                self.seen.late_speakers.unanswered(
+                    asked.unit, asked.due, transaction.start, transaction.end, self.learnt.timeout
+                )
+            is_waited_for = asked.no in self.waited_for
+            station.waited_for += is_waited_for
+            self.lost[transaction.id] = Lost(asked.unit, asked.key, asked.no, is_unheard, is_waited_for)
             if len(self.lost) > LOST_KEPT:
                 del self.lost[next(iter(self.lost))]
             return
@@ -367,6 +399,8 @@ class ModbusFindings(Remembered):
             station.damaged.add(transaction.end, transaction.request, transaction.response)
             station.garbled += transaction.response is None
             return
+        if not asked.header.ok and self.late_read < asked.no and not self.torn.is_torn(transaction.id):
+            self.seen.damaged_here.add(transaction.start, transaction.request)
         self.seen.strikes.whole()
         self.seen.late_speakers.answered(asked.unit, f"station {asked.unit}", transaction.start)
         station.answered += 1
@@ -385,6 +419,9 @@ class ModbusFindings(Remembered):
             else:
                 self.seen.malformed_codes[code or 0] += 1
         elif transaction.error is not None and asked.header.ok and self._is_unfit(transaction, asked, code, answer):
+            if is_disturbed and self._answers_another(transaction, asked, answer):
+                self.seen.crossed.add(transaction.end, transaction.request, transaction.response)
+                return
             station.unfit.add(transaction.end, transaction.request, transaction.response)
             if len(station.unfit_words) < _WORDS_KEPT:
                 station.unfit_words[transaction.error] += 1
@@ -394,6 +431,13 @@ class ModbusFindings(Remembered):
         if code is not None or transaction.id in self.contradictory:  # an exception to something else
             return True
         return bool(answer) and not is_answer(asked.octets, answer)
+
+    def _answers_another(self, transaction: Transaction, asked: AskedRequest, answer: bytes) -> bool:
+        """Whether an answer fits what that station is asked besides, and there was no time for a turn in between: the
+        octets before it hide a request that came while this one waited."""
+        turn = self.learnt.turn(asked.unit, asked.answer_time(self.timing.char))
+        soon = turn is not None and transaction.latency is not None and transaction.latency.nominal <= turn[1]
+        return soon and any(is_answer(other, answer) for other in self.seen.cycles.asked_of(asked.unit))
 
     def _compare_with_timeout(self, station: StationRecord, transaction: Transaction, least: int) -> None:
         """Whether an answer took long; counted anew when the timeout gets known, since the limit is another then."""
@@ -409,7 +453,11 @@ class ModbusFindings(Remembered):
         lost = self.lost.pop(transaction.of or 0, None)
         if lost is not None:
             station.forgive(lost)
-            if self.waits.get(lost.no, AT_ONCE) < _NO_WAIT:
+            waited = self.waits.get(lost.no, AT_ONCE)
+            if lost.no in self.hasty:
+                self.seen.crossed.add(transaction.start, lost.no, transaction.response)
+                return
+            if waited < _NO_WAIT:
                 return
         station.late.add(transaction.start, transaction.response)
 

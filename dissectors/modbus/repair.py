@@ -64,7 +64,8 @@ def _swapped(octets: bytes, expected: Expected | None, heard: Set[int]) -> Repai
     if len(octets) < _SHORTEST or octets[-1] == octets[-2]:
         return None
     whole = octets[:-2] + octets[:-3:-1]
-    if crc16_modbus(whole) or not _is_known(whole[0], expected, heard) or not _is_formed(whole, expected):
+    known = _is_known(whole[0], expected, heard) or _may_be_first(whole, heard)
+    if crc16_modbus(whole) or not known or not _is_formed(whole, expected):
         return None
     return Repair(Flaw.CHECK_SWAPPED, whole)
 
@@ -78,9 +79,7 @@ def _without_first(octets: bytes, expected: Expected | None, heard: Set[int]) ->
         if unit is None:
             continue
         whole = bytes((unit,)) + rest
-        known = _is_known(unit, expected, heard)
-        if not known and flaw is Flaw.FIRST_MISSING and not heard:  # where all frames lack it, none was ever heard
-            known = unit <= MAX_UNIT and _is_well_formed_request(whole)
+        known = _is_known(unit, expected, heard) or (flaw is Flaw.FIRST_MISSING and _may_be_first(whole, heard))
         if known and _is_formed(whole, expected):
             return Repair(flaw, whole)
     return None
@@ -129,6 +128,11 @@ def _is_well_formed_request(whole: bytes) -> bool:
         reading.request and reading.length == len(whole) and octet_bits(whole, 0, reading) >= _WELL_FORMED
         for reading in readings(whole, 0, len(whole))
     )
+
+
+def _may_be_first(whole: bytes, heard: Set[int]) -> bool:
+    """Whether it may be a request where nobody was ever heard, since all have that flaw."""
+    return not heard and whole[0] <= MAX_UNIT and _is_well_formed_request(whole)
 
 
 def _is_known(unit: int, expected: Expected | None, heard: Set[int]) -> bool:

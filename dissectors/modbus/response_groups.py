@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from statistics import median
 
 from dissectors.tracker import Interval
 
@@ -24,6 +25,7 @@ GROUP_SHARE = 1 / 8
 GAP_LEAST = 3_000_000
 """ns between the groups; what a device's main loop adds is mostly less."""
 
+_FIRST_KEPT = 8  # response times, of which the median is taken
 _FEW_VALUES = 3  # different answers of a group, up to which it says something that the two groups have none in common
 
 
@@ -53,9 +55,31 @@ class Groups:
 
 @dataclass(slots=True)
 class SameRequest:
-    """The last answers to one and the same request, in the order they came."""
+    """The last answers to one and the same request, in the order they came, and how long the first of all took."""
 
+    first: list[Interval] = field(default_factory=list)
     answers: deque[AnsweredRequest] = field(default_factory=lambda: deque(maxlen=ANSWERS_KEPT))
+
+    def add(self, answers: Sequence[AnsweredRequest]) -> None:
+        """Take the next ones."""
+        self.first += [answer.latency for answer in answers[: _FIRST_KEPT - len(self.first)]]
+        self.answers.extend(answers)
+
+    def needed(self, places: Sequence[int]) -> Sequence[int]:
+        """Of the places of the next ones those that are remembered: the first of all, and the last."""
+        missing = _FIRST_KEPT - len(self.first)
+        if missing <= 0 or len(places) <= ANSWERS_KEPT:
+            return places[-ANSWERS_KEPT:]
+        return [*places[:missing], *places[max(missing, len(places) - ANSWERS_KEPT) :]]
+
+    def rose(self) -> int | None:
+        """By how much the median response time rose from the first ones to the last, ns: 0 where it is not half as long
+        again by the bounds that the adapter leaves; None while they are too few."""
+        if len(self.first) < _FIRST_KEPT or len(self.answers) < 2 * _FIRST_KEPT:
+            return None
+        last = [answer.latency for answer in self.answers][-_FIRST_KEPT:]
+        before, after = median([one.high for one in self.first]), median([one.low for one in last])
+        return round(after - before) if 2 * after > 3 * before else 0
 
     def groups(self) -> Groups | None:
         """The two groups that they fall into; None where they do not, or where it cannot be known."""

@@ -26,10 +26,10 @@ _ALL = (
         "MB001",
         Severity.ERROR,
         "no answer",
-        "Requests to a station of which no good frame was ever heard, and at most 1 in 4 of them followed by octets "
+        "Requests to a station of which no good frame was ever heard here, at most 1 in 4 of them followed by octets "
         "that are no frame. Where it was asked only once, repeats not counted, it is only noted.",
-        "no station at this address: off, set to another address or baud rate, or cut off",
-        "its supply, address switch and baud rate; if it is gone, take it out of the master's list",
+        "no station at this address: off, set to another address or baud rate, cut off, or not heard by this tap",
+        "whether the master has its values, which tells that it answers; else its supply, address switch and baud rate",
         explains=("MB105", "MB104"),
     ),
     Rule(
@@ -97,7 +97,8 @@ _ALL = (
         Severity.WARNING,
         "exception",
         "A station answers with an exception code. Codes 1 … 11 have the meanings of Modbus Application Protocol "
-        "V1.1b3, clause 7; others are the vendor's. Where the profile of the device words a code, those words count.",
+        "V1.1b3, clause 7; others are the vendor's. Where the profile of the device words a code, those words count. "
+        "Only a note where codes 1 … 3 answer what is tried once for eight times that something is polled.",
         "the station heard the request well and refuses it; the code says why",
         "the code, the register and the count, against the device's manual",
     ),
@@ -114,7 +115,8 @@ _ALL = (
         "MB010",
         Severity.WARNING,
         "answer does not fit the request",
-        "A good frame in answer whose function, count, address or copy is not what was asked for.",
+        "A good frame in answer whose function, count, address or copy is not what was asked for; or requests that are "
+        "given back whole in place of their answer.",
         "a device that does something else than it was asked for, or answers an earlier request",
         "the frames named; the device's manual and firmware",
     ),
@@ -123,17 +125,18 @@ _ALL = (
         Severity.WARNING,
         "check octets swapped",
         "Answers whose check is right once its two octets change places: at least three, and most of the station's "
-        "damaged answers. RTU sends the low octet of the CRC first (Modbus over Serial Line V1.02, 2.5.1.2).",
+        "damaged answers. RTU sends the low octet of the CRC first (Modbus over Serial Line V1.02, 2.5.1.2). An error "
+        "of the master where all its requests are so: nobody answers them.",
         "the device sends its check the wrong way round; what it says is sound",
         "the device's firmware; a master that is told to take the check so can read it",
-        explains=_OF_DAMAGE,
+        explains=("MB009", "LN003", *_OF_DAMAGE),
     ),
     Rule(
         "MB012",
         Severity.WARNING,
         "first octet lost",
         "Frames that are good once their first octet, the address, is put there or put right: at least three, and most "
-        "of the sender's damaged frames.",
+        "of the sender's damaged frames. Of the master where it is all stations that answer so soon, at least three.",
         "the sender switches its driver on too late, or a receiver or repeater is not ready when a frame begins",
         "the time that its driver is on before it sends; bias that keeps the line at rest; a converter on the way",
         explains=_OF_DAMAGE,
@@ -204,10 +207,13 @@ _ALL = (
         "MB018",
         Severity.WARNING,
         "request copied back",
-        "Nine in ten requests to one station come back at once, and those to others never.",
-        "this station's driver hears itself, or its converter repeats what it hears, before the station answers",
-        "how its driver and receiver are enabled; the converter in front of it",
-        explains=("MB005", "MB104", "MB301", "LN205"),
+        "Nine in ten requests to one station come back at once, and those to others never. Of the bus: nine in ten "
+        "requests, to two stations or more, come a second time, always as long after the first, within 150 ms, never "
+        "a third, and are answered then.",
+        "this station's driver hears itself, or its converter repeats what it hears, before the station answers; where "
+        "all requests come twice, a relay or a slow echo that this tap hears beside the master",
+        "how its driver and receiver are enabled; the converter in front of it; which radio or repeater is on the way",
+        explains=("MB002", "MB003", "MB004", "MB005", "MB020", "MB104", "MB301", "LN205"),
     ),
     Rule(
         "MB019",
@@ -219,6 +225,40 @@ _ALL = (
         "others may wait for the LF and drop the frame",
         "its turnaround or transmit-delay setting, a converter's timer for the direction; its end character",
         explains=("MB104",),
+    ),
+    Rule(
+        "MB020",
+        Severity.WARNING,
+        "answers not heard here",
+        "Requests that nothing followed here, after which the master went on as it does after an answer: no later than "
+        "answers and its usual pauses take, and, four times in five, without asking again. Or, then an error, requests "
+        "to two stations or more of which none is ever heard and none is asked again.",
+        "answers that this tap does not hear: a signal too weak here, a four-wire line of which this pair carries the "
+        "master alone, reads that the recording lost; or stations that are off, and a master that sends by the clock",
+        "whether the master has their values; tap near those stations, and on both pairs of a four-wire line",
+        explains=("MB002", "MB105", "MB207"),
+    ),
+    Rule(
+        "MB021",
+        Severity.WARNING,
+        "check always wrong",
+        "A station of which no good answer was heard, and answers without a line error whose check alone is wrong: at "
+        "least five, and 3 in 4 of the damaged ones, differ from the right one in the same bits as others of their "
+        "length that say something else, or as a check does that begins with 0. Noise changes other bits each time.",
+        "the device computes its check otherwise: another start value or polynomial, or over other octets",
+        "the device's firmware; whether a converter on the way changes octets",
+        explains=("MB001", *_OF_DAMAGE),
+    ),
+    Rule(
+        "MB022",
+        Severity.WARNING,
+        "requests damaged here alone",
+        "Requests that arrive damaged at this tap and are answered all the same, more of them than of those that are "
+        "not answered. A note where there are few, or answers are damaged as well.",
+        "noise at this tap, or a signal of the master too weak here; where it was heard worse still, the answers seem "
+        "to come unasked",
+        "this tap's place, its ground and its wires to the line; whether the master's reads fail at all",
+        explains=("MB207", "LN101"),
     ),
     Rule(
         "MB101",
@@ -236,7 +276,7 @@ _ALL = (
         "response time drifts",
         "The median response time of the last quarter of the answers is over half as long again as that of the first "
         "quarter, and over 5 ms longer, by the bounds that the adapter leaves; it rose from quarter to quarter, and "
-        "the quickest answers with it.",
+        "the quickest answers with it, and so it did of most requests, each compared with itself.",
         "a station that gets busier or fills up, and will run into the timeout",
         "its load and log; restart it and see whether the time falls back",
     ),
@@ -247,7 +287,7 @@ _ALL = (
         "Good answers that come after the master's timeout, often into the next request.",
         "the master's timeout is too short for this station",
         "raise the master's response timeout above the times seen here",
-        explains=("MB101", "MB104", "MB201", "MB301", "MB010", *_OF_LINE),
+        explains=("MB101", "MB104", "MB201", "MB301", "MB005", "MB010", *_OF_LINE),
     ),
     Rule(
         "MB104",
@@ -255,7 +295,7 @@ _ALL = (
         "repeats",
         "Requests to a station that answers, sent again because the first try got no good answer, and the time that "
         "passed from each failed try to the next. A warning from three on, when it is over 2% of the time.",
-        "each lost or damaged frame costs a whole timeout",
+        "each lost or damaged frame costs the time until it is asked for again",
         "the cause of the losses first; then a shorter timeout, well above the slowest answer",
     ),
     Rule(
@@ -311,11 +351,12 @@ _ALL = (
         "two masters",
         "Requests that come while another one waits for a station that is alive, sooner than that station ever answers "
         "(what seems an answer to the second of two masters and is one to the first aside), so that no answer can have "
-        "been missed; or the same request twice at once, and an answer to each. At least three; not where "
+        "been missed; or the same request twice at once, and an answer to each; or one between another and its answer, "
+        "which came no later than answers do. At least three; not where "
         "they always come after the same time, as those of a single master do that never waits.",
         "two masters on one bus, or a commissioning tool left connected",
         "find the second master; a bus has one, use a gateway or multiplexer for more",
-        explains=(*_OF_COLLISIONS, "MB002", "MB003", "MB201", "MB202", "MB302"),
+        explains=(*_OF_COLLISIONS, "MB020", "MB002", "MB003", "MB201", "MB202", "MB302"),
     ),
     Rule(
         "MB204",
@@ -417,7 +458,8 @@ _ALL = (
         "MB402",
         Severity.INFO,
         "addresses searched",
-        "At least four addresses that the master asked once, and that nobody has.",
+        "At least four addresses that the master asked once, or eight that it asked up to three times beside stations "
+        "that it asks three times as often (20 where there are none), and that nobody has.",
         "somebody searched the bus for stations",
         "nothing",
     ),

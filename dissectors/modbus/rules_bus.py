@@ -12,7 +12,8 @@ from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.damage_shares import DamageShare, shares_of_damage, to_blame
 from dissectors.modbus.finding_words import note_if, request_words, units
 from dissectors.modbus.rules import RULES
-from dissectors.modbus.rules_station import FLAWS, is_absent, of_station
+from dissectors.modbus.rules_station import FLAWS, is_absent, of_missing, of_station
+from dissectors.modbus.rules_unheard import of_unheard
 from dissectors.words import duration, fine_milliseconds
 
 _WASTE = 0.05
@@ -27,9 +28,9 @@ _COMMON_LEAST = 3
 
 def judge(seen: BusRecord, timeout: int | None) -> tuple[Finding, ...]:
     """All findings: the bus first, then station by station. `timeout`: the master's, ns, None while unlearnt."""
-    damage = shares_of_damage(seen)
+    damage, scanned, unheard = shares_of_damage(seen), seen.scanned(), seen.unheard()
     made = [
-        *_of_bus(seen, "master" in damage.blamed),
+        *_of_bus(seen, "master" in damage.blamed, scanned, unheard),
         *_of_masters(seen),
         *_of_gaps(seen),
         *_of_ends(seen),
@@ -37,14 +38,17 @@ def judge(seen: BusRecord, timeout: int | None) -> tuple[Finding, ...]:
         *_of_late_speakers(seen),
     ]
     for unit in sorted(seen.stations):
-        made += of_station(seen, unit, seen.stations[unit], timeout, f"station {unit}" not in damage.blamed)
+        station = seen.stations[unit]
+        if unit not in unheard:
+            made += of_missing(seen, unit, station, unit in scanned)
+        made += of_station(seen, unit, station, timeout, f"station {unit}" not in damage.blamed)
     return tuple(made)
 
 
 # ---- the bus
 
 
-def _of_bus(seen: BusRecord, is_blamed: bool) -> Iterator[Finding]:
+def _of_bus(seen: BusRecord, is_blamed: bool, scanned: list[int], unheard: list[int]) -> Iterator[Finding]:
     requests = sum(station.asked for station in seen.stations.values()) + seen.damaged_requests.count
     damaged = seen.damaged_requests
     if damaged.count:
@@ -52,18 +56,23 @@ def _of_bus(seen: BusRecord, is_blamed: bool) -> Iterator[Finding]:
         yield damaged.found(
             RULES["MB009"], "master", words, note_if(seen.rare(damaged.count, requests) or not is_blamed)
         )
+    if not damaged.count or seen.damaged_here.count > damaged.count:
+        yield from _damaged_here(seen, requests)
+    yield from _cut_by_master(seen)
     yield from _of_requests(seen)
-    scanned = seen.scanned()
     if scanned:
-        words = f"{len(scanned)} addresses asked once and silent, {scanned[0]} to {scanned[-1]}"
+        most = max(seen.stations[unit].turns for unit in scanned)
+        often = "once" if most == 1 else f"up to {times(most)}"
+        words = f"{len(scanned)} addresses asked {often} and silent, {scanned[0]} to {scanned[-1]}"
         first = min(seen.stations[unit].missing.first for unit in scanned)
         last = max(seen.stations[unit].missing.last for unit in scanned)
         yield found(RULES["MB402"], "bus", words, first=first, last=last, count=len(scanned))
     absent = {
         unit: station
         for unit, station in seen.stations.items()
-        if is_absent(station) and station.missing.count > 1 and unit not in scanned
+        if is_absent(station) and station.missing.count > 1 and unit not in scanned and unit not in unheard
     }
+    yield from of_unheard(seen, unheard)
     waited = sum(station.waited for station in absent.values())
     if waited:
         share = waited / seen.span
@@ -101,6 +110,37 @@ def _of_bus(seen: BusRecord, is_blamed: bool) -> Iterator[Finding]:
     yield from _cycle(seen)
 
 
+def _damaged_here(seen: BusRecord, requests: int) -> Iterator[Finding]:
+    """Requests that only this tap hears damaged, since they were answered."""
+    damaged, others = seen.damaged_here, sum(station.damaged.count for station in seen.stations.values())
+    if damaged.count:
+        words = f"{damaged.count} of {counted(requests, 'request')} damaged here, and answered all the same"
+        rare = seen.rare(damaged.count, requests) or 4 * others > damaged.count
+        yield damaged.found(RULES["MB022"], "bus", words, note_if(rare))
+
+
+def _cut_by_master(seen: BusRecord) -> Iterator[Finding]:
+    """The first octet of all answers that come soon enough: somebody else's driver still holds the line."""
+    cut = seen.cut_by_master
+    if not cut:
+        return
+    tally = Tally()
+    for unit in cut:
+        for no in seen.stations[unit].first_lost.evidence:
+            tally.add(seen.stations[unit].damaged.first, no)
+    count = sum(seen.stations[unit].first_lost.count for unit in cut)
+    latest = max(seen.stations[unit].first_lost.last for unit in cut)
+    words = f"first octet of {counted(count, 'answer')} lost, of {units(cut)}: all that answer within "
+    words += fine_milliseconds(latest)
+    if any(unit not in cut and one.times.count for unit, one in seen.stations.items()):
+        words += "; slower ones are whole"
+    finding = tally.found(RULES["MB012"], "master", words)
+    last = max(seen.stations[unit].damaged.last for unit in cut)
+    means = "the master's driver, or a converter's, still holds the line when quick stations begin to answer"
+    following = "how soon the master's driver lets go after a request; the converter's turnaround time"
+    yield replace(finding, count=count, last=last, means=means, next=following, stations=tuple(cut))
+
+
 def _of_requests(seen: BusRecord) -> Iterator[Finding]:
     """What is wrong with what the master sends, and what its own adapter makes of it."""
     malformed = seen.malformed
@@ -131,10 +171,19 @@ def _of_requests(seen: BusRecord) -> Iterator[Finding]:
         first, last = seen.first or 0, station.last_heard or 0
         name = f"station {copying[0]}"
         yield found(RULES["MB018"], name, words, first=first, last=last, count=station.echoed)
+    again = seen.repeated_after
+    if again is not None:
+        count = seen.again.tally.count
+        words = (
+            f"{counted(count, 'request')} came a second time {fine_milliseconds(again)} after the first, never a third"
+        )
+        yield seen.again.tally.found(RULES["MB018"], "bus", f"{words}, and were answered then")
     for flaw, tally in seen.requests_damaged_by.items():
         if tally.count >= _CUT_LEAST and 2 * tally.count >= seen.damaged_requests.count:
             words = f"{counted(tally.count, 'request')} good but for one thing: {flaw.value}"
             severity = note_if(seen.rare(tally.count, seen.requests))
+            if tally.count == seen.requests:
+                words, severity = f"{words}, every time", Severity.ERROR  # no station can answer
             yield tally.found(RULES[FLAWS[flaw]], "master", words, severity)
 
 
@@ -152,7 +201,7 @@ def _of_masters(seen: BusRecord) -> Iterator[Finding]:
     hasty, broken_in = list(filter(too_soon, seen.hasty)), list(filter(too_soon, seen.broken_in))
     gaps = sorted(row[0] for row in (*hasty, *broken_in))
     if len(gaps) < _MASTERS_LEAST:
-        yield from _asked_twice(seen)
+        yield from list(_asked_twice(seen)) or _crossed(seen)
         return
     same = MS + seen.timing.latency
     habitual = max(sum(abs(one - gap) <= same for one in gaps) for gap in gaps)
@@ -178,6 +227,15 @@ def _asked_twice(seen: BusRecord) -> Iterator[Finding]:
         return
     words = f"{counted(twice.count, 'request')} came twice, one directly behind the other, and had two answers each"
     yield twice.found(RULES["MB203"], "bus", words)
+
+
+def _crossed(seen: BusRecord) -> Iterator[Finding]:
+    """Requests between another and its answer, which came no later than answers do: where the adapter's reads hide how
+    soon a request came, the order of the frames still tells. A master that never waits sends all its requests so."""
+    crossed = seen.crossed
+    if crossed.count >= _MASTERS_LEAST and _HABIT * crossed.count < seen.requests:
+        words = f"{counted(crossed.count, 'request')} came between another one and its answer, which was not late"
+        yield crossed.found(RULES["MB203"], "bus", words)
 
 
 def _of_gaps(seen: BusRecord) -> Iterator[Finding]:

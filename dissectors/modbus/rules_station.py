@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from dissectors.findings import Finding, Severity, Tally, counted, found, times
+from dissectors.checksums import crc16_modbus
+from dissectors.findings import EVIDENCE_MAX, Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Flaw
 from dissectors.late_speakers import reaching
 from dissectors.line import MS
@@ -31,6 +32,10 @@ FLAWS = {
 }
 """The rule about each kind of damage that is always the same."""
 
+_NOT_THERE = (1, 2, 3)  # exceptions that tell a program that tries what a device can do
+_PROBED = 8  # times that something else is asked for each try
+_NEARLY_ALL_LEAST = 10  # damaged answers
+_WRONG_CHECKS = 5  # answers, at least
 _SYSTEM_LEAST = 3  # of one kind, before it is a system
 _EXCESS_SPREAD = 2  # octets
 _HEX_SHOWN = 16
@@ -42,15 +47,14 @@ def of_station(
     seen: BusRecord, unit: int, station: StationRecord, timeout: int | None, is_common: bool
 ) -> Iterator[Finding]:
     name = f"station {unit}"
-    yield from _missing(seen, name, unit, station)
     foreign = _foreign(seen, name, station)
-    systematic = [*_flawed(seen, name, station), *([foreign] if foreign else [])]
+    miscounted = None if foreign else _miscounted(name, station)
+    systematic = [*_flawed(seen, name, station), *(one for one in (foreign, miscounted) if one)]
     yield from systematic
     explained = sum(finding.count for finding in systematic)
     if 4 * explained < 3 * station.damaged.count:
         yield from _damaged(seen, name, station, is_common)
-    for (key, code), tally in sorted(station.exceptions.items(), key=lambda item: str(item[0])):
-        yield _exception(name, station, key, code, tally, seen.maker_words(unit, code))
+    yield from _exceptions(seen, name, unit, station)
     if station.unfit.count:
         why, _ = station.unfit_words.most_common(1)[0] if station.unfit_words else ("", 0)
         words = f"{station.unfit.count} of {counted(station.answered, 'answer')} not as asked for: {why}"
@@ -70,12 +74,13 @@ def of_station(
         )
 
 
-def _missing(seen: BusRecord, name: str, unit: int, station: StationRecord) -> Iterator[Finding]:
-    missing = station.missing
+def of_missing(seen: BusRecord, unit: int, station: StationRecord, is_scanned: bool) -> Iterator[Finding]:
+    """Requests to a station that nothing answered. `is_scanned`: they were those of a search."""
+    name, missing = f"station {unit}", station.missing
     if not missing.count:
         return
     if is_absent(station):
-        if missing.count > 1 and not seen.is_scanned(unit):
+        if missing.count > 1 and not is_scanned:
             words = f"no answer to any of {station.asked} requests"
             stray = station.damaged.count
             words += f"; octets that are no good answer followed {times(stray)}" if stray else ""
@@ -83,7 +88,7 @@ def _missing(seen: BusRecord, name: str, unit: int, station: StationRecord) -> I
         else:
             again = f", sent {times(missing.count)}" if missing.count > 1 else ""
             words = f"no answer to the only request{again}"
-            if not seen.is_scanned(unit):
+            if not is_scanned:
                 yield missing.found(RULES["MB001"], name, words, Severity.NOTE)
         return
     silent = station.silent
@@ -94,6 +99,10 @@ def _missing(seen: BusRecord, name: str, unit: int, station: StationRecord) -> I
     ignored = [(key, request) for key, request in sorted(station.requests.items(), key=str) if _is_ignored(request)]
     if station.answered >= 3 and silent.count < SILENT_AT_END:
         for key, request in ignored:
+            if 10 * request.echoed >= 9 * request.tries:
+                words = f"{counted(request.tries, 'request')} to {request_words(key)}, all given back whole"
+                yield request.missing.found(RULES["MB010"], name, words)
+                continue
             words = f"no answer to any of {request.tries} requests to {request_words(key)}; it answers others"
             yield request.missing.found(RULES["MB004"], name, words)
     else:
@@ -151,7 +160,14 @@ def _damaged(seen: BusRecord, name: str, station: StationRecord, is_common: bool
     low, high = wilson(damaged.count, station.asked)
     if station.asked >= 20:
         words += f"; that is {low:.1%} to {high:.1%} of all, with 95% confidence"
-    yield damaged.found(RULES["MB005"], name, words, note_if(rare or is_common))
+    finding = damaged.found(RULES["MB005"], name, words, note_if(rare or is_common))
+    if damaged.count >= _NEARLY_ALL_LEAST and 10 * damaged.count >= 9 * station.asked:  # noise leaves some
+        finding = replace(
+            finding,
+            means=f"{finding.means}; or two stations with this address, whose answers fall on each other",
+            next=f"switch the station off and see whether something still answers; {finding.next}",
+        )
+    yield finding
 
 
 def _twice(name: str, station: StationRecord, words: str, slow: bool) -> Finding:
@@ -174,6 +190,8 @@ def _flawed(seen: BusRecord, name: str, station: StationRecord) -> Iterator[Find
         by_code.setdefault(FLAWS[flaw], []).append((flaw, tally))
     for code, parts in sorted(by_code.items()):
         count = sum(tally.count for _, tally in parts)
+        if code == "MB012" and seen.cut_by_master:
+            continue
         if count < _SYSTEM_LEAST or 2 * count < station.damaged.count:
             continue
         flaw, tally = max(parts, key=lambda part: part[1].count)
@@ -181,6 +199,23 @@ def _flawed(seen: BusRecord, name: str, station: StationRecord) -> Iterator[Find
         if count == station.damaged.count == station.asked:
             words += ", every time"
         yield replace(tally.found(RULES[code], name, words, note_if(seen.rare(count, station.asked))), count=count)
+
+
+def _miscounted(name: str, station: StationRecord) -> Finding | None:
+    """Checks that are always wrong, in frames that are right otherwise."""
+    always: dict[int, Tally] = {}  # the commonest difference among frames of one length
+    for (difference, octets), wrong in station.wrong_checks.items():
+        begun_with_0 = difference == int.from_bytes(crc16_modbus(bytes(octets - 2)).to_bytes(2, "little"), "big")
+        is_system = octets and (len(wrong.right) > 1 or begun_with_0)  # the same octets again may be spoilt alike
+        if is_system and (octets not in always or wrong.tally.count > always[octets].count):
+            always[octets] = wrong.tally
+    same = [tally for tally in always.values() if tally.count >= _SYSTEM_LEAST]
+    count, flawed = sum(tally.count for tally in same), sum(tally.count for tally in station.flaws.values())
+    few = count < _WRONG_CHECKS or 4 * count < 3 * station.damaged.count
+    if few or station.times.count or 2 * flawed > count:
+        return None
+    words = f"{count} of {counted(station.asked, 'answer')} right but for the check, which always differs alike"
+    return replace(max(same, key=lambda tally: tally.count).found(RULES["MB021"], name, words), count=count)
 
 
 def _foreign(seen: BusRecord, name: str, station: StationRecord) -> Finding | None:
@@ -215,6 +250,26 @@ def _hex(octets: bytes) -> str:
     return octets[:_HEX_SHOWN].hex(" ").upper() + (" …" if len(octets) > _HEX_SHOWN else "")
 
 
+def _exceptions(seen: BusRecord, name: str, unit: int, station: StationRecord) -> Iterator[Finding]:
+    """Each request that is refused; one note for all that were only tried, beside those that are asked all the time."""
+    tried: dict[int, list[tuple[Key, Tally]]] = {}
+    for (key, code), tally in sorted(station.exceptions.items(), key=lambda item: str(item[0])):
+        request = station.requests.get(key)
+        if code in _NOT_THERE and request is not None and _PROBED * request.tries <= station.turns:
+            tried.setdefault(code, []).append((key, tally))
+        else:
+            yield _exception(name, station, key, code, tally, seen.maker_words(unit, code))
+    for code, probes in tried.items():
+        key, tally = probes[0]
+        finding = _exception(name, station, key, code, tally, seen.maker_words(unit, code))
+        further = f", and to {counted(len(probes) - 1, 'other request')}" if len(probes) > 1 else ""
+        words = f"{finding.seen}{further}; hardly asked beside what is polled"
+        evidence = tuple(sorted(no for _, one in probes for no in one.evidence))
+        made = tally.found(RULES["MB008"], name, words, Severity.NOTE)
+        made = replace(made, count=sum(one.count for _, one in probes), evidence=evidence[:EVIDENCE_MAX])
+        yield replace(made, last=max(one.last for _, one in probes), means=finding.means, next=finding.next)
+
+
 def _exception(name: str, station: StationRecord, key: Key, code: int, tally: Tally, maker: str) -> Finding:
     """`maker`: what the manual of the device says of the code; it stands before the standard."""
     otherwise = MAKER_EXCEPTION if maker else VENDOR_EXCEPTION
@@ -242,7 +297,10 @@ def _times(
         first, last = quarters[0], quarters[-1]
         rises = all(20 * b.nominal >= 19 * a.nominal for a, b in pairwise(quarters))
         quickest_too = 2 * (last.least - first.least) > last.nominal - first.nominal  # not only more of a second kind
-        if rises and quickest_too and 2 * last.low > 3 * first.high and last.low - first.high > 5 * MS:
+        risen = [rise for same in station.same.values() if (rise := same.rose()) is not None]
+        each_too = 2 * sum(rise > 5 * MS for rise in risen) > len(risen)  # not only other requests than before
+        longer = 2 * last.low > 3 * first.high and last.low - first.high > 5 * MS
+        if rises and quickest_too and longer and each_too:
             rose = f"from {fine_milliseconds(first.nominal)} to {fine_milliseconds(last.nominal)}"
             words = f"median response time rose {rose}"
             yield found(
@@ -256,8 +314,8 @@ def _times(
     if station.answered and station.repeats.count:
         share = station.repeats_cost / seen.span
         words = (
-            f"{counted(station.repeats.count, 'request')} sent again; each cost the time that the master had waited: "
-            f"{duration(station.repeats_cost)} in all, {share:.1%} of the time of the bus"
+            f"{counted(station.repeats.count, 'request')} sent again; from one try to the next "
+            f"{duration(station.repeats_cost)} passed in all, {share:.1%} of the time of the bus"
         )
         costly = share > _REPEATS_COST and station.repeats.count >= _REPEATS_LEAST and not is_common
         yield station.repeats.found(RULES["MB104"], name, words, Severity.WARNING if costly else None)

@@ -19,6 +19,8 @@ SAME_KEPT = 8
 """Requests of a station whose answers are compared with each other."""
 
 _BLOCKS = 64
+_CHECKS_KEPT = 64
+_NEARLY_ALL = 4  # of five
 
 Key = tuple[str, int | None]
 """A request as a poll list has it: kind and first register."""
@@ -129,6 +131,7 @@ class Requested:
 
     turns: int = 0
     tries: int = 0
+    echoed: int = 0  # of them, given back whole
     missing: Tally = field(default_factory=Tally)
 
 
@@ -139,19 +142,39 @@ class Lost:
     unit: int
     key: Key
     no: int
+    is_unheard: bool = False
+    is_waited_for: bool = False
+
+
+@dataclass(slots=True)
+class WrongCheck:
+    """Answers of one length whose check differs from the right one in the same bits. `right`: two of the right ones."""
+
+    tally: Tally = field(default_factory=Tally)
+    right: set[int] = field(default_factory=set)
+
+    def add(self, time: int, no: int, right: int) -> None:
+        """Take the next one."""
+        self.tally.add(time, no)
+        if len(self.right) < 2:
+            self.right.add(right)
 
 
 @dataclass(slots=True)
 class StationRecord:
-    """One station. `missing`: no octet followed. `silent`: those since its last sign of life."""
+    """One station. `missing`: no octet followed. `silent`: those since its last sign of life. `unheard`: of those that
+    are missing such after which the master went on as after an answer."""
 
     asked: int = 0
     answered: int = 0
     missing: Tally = field(default_factory=Tally)
     silent: Tally = field(default_factory=Tally)
+    unheard: Tally = field(default_factory=Tally)
     damaged: Tally = field(default_factory=Tally)
     cut: int = 0  # of the damaged answers: ended early
     last_octet: Tally = field(default_factory=Tally)  # only the last octet is wrong
+    first_lost: Tally = field(default_factory=Tally)  # only the first octet is wrong; when: ns after the request
+    wrong_checks: dict[tuple[int, int], WrongCheck] = field(default_factory=dict)  # by difference, and length of frame
     talked_over: Tally = field(default_factory=Tally)  # begun as an answer, and longer than it can be
     outlasting: Tally = field(default_factory=Tally)  # the same, and not over when the master gave up
     excess: list[int] = field(default_factory=list)  # octets by which those were too long
@@ -170,6 +193,7 @@ class StationRecord:
     twice: Tally = field(default_factory=Tally)
     repeats: Tally = field(default_factory=Tally)
     repeats_cost: int = 0  # ns
+    waited_for: int = 0  # of the missing, those that the master surely waited for
     waited: int = 0  # ns, that the master spent on requests that nothing followed
     last_start: int = 0  # of its newest request
     last_heard: int | None = None
@@ -187,6 +211,12 @@ class StationRecord:
         return flawed + (self.garbage.tally.count if self.garbage.is_system else 0)
 
     @property
+    def is_unheard(self) -> bool:
+        """Whether its answers were missed here: the master went on as after an answer, and asked hardly ever again."""
+        unheard, repeats = self.unheard.count, self.repeats.count
+        return 0 < self.missing.count <= 2 * unheard and _NEARLY_ALL * max(self.waited_for, repeats) <= unheard
+
+    @property
     def turns(self) -> int:
         """How often the request was asked for the first time that was asked most often."""
         return max((request.turns for request in self.requests.values()), default=0)
@@ -200,6 +230,13 @@ class StationRecord:
             request = self.requests.setdefault(key, Requested())
         return request
 
+    def wrong_check(self, difference: int, octets: int) -> WrongCheck:
+        """The record of answers whose check differs so, without a line error; one for others beyond _CHECKS_KEPT."""
+        kind = difference, octets
+        if kind not in self.wrong_checks and len(self.wrong_checks) >= _CHECKS_KEPT:
+            kind = 0, 0
+        return self.wrong_checks.setdefault(kind, WrongCheck())
+
     def exception(self, key: Key, code: int) -> Tally:
         """The record of one exception to one kind of request; beyond KEYS_KEPT, one for all others."""
         if (key, code) not in self.exceptions and len(self.exceptions) >= KEYS_KEPT:
@@ -210,7 +247,7 @@ class StationRecord:
         """Keep an answer beside the others to exactly the same request; the first SAME_KEPT requests only."""
         same = self.same_request(key, request)
         if same is not None:
-            same.answers.append(answer)
+            same.add((answer,))
 
     def same_request(self, key: Key, request: bytes) -> SameRequest | None:
         """The answers to exactly the same request, those to come included; None beyond SAME_KEPT requests."""
@@ -233,7 +270,9 @@ class StationRecord:
     def forgive(self, lost: Lost) -> None:
         """The request was answered, after its master had given up: it is not lost as well."""
         request = self.requests.get(lost.key)
-        for tally in (self.missing, request.missing if request is not None else None):
+        unheard = self.unheard if lost.is_unheard else None
+        self.waited_for -= lost.is_waited_for
+        for tally in (self.missing, unheard, request.missing if request is not None else None):
             if tally is not None and tally.count:
                 tally.count -= 1
                 if lost.no in tally.evidence:
@@ -267,6 +306,10 @@ class Cycles:
         if periods is None:
             periods = self._periods[octets] = deque(maxlen=256)
         periods.append(start - before)
+
+    def asked_of(self, unit: int) -> list[bytes]:
+        """What a unit is asked."""
+        return [octets for octets in self._last if octets[:1] == bytes((unit,))]
 
     def usual(self) -> tuple[int, Key, list[int]] | None:
         """Unit and kind of the request with the most periods, and those in ascending order; None where none repeats."""

@@ -14,7 +14,7 @@ from dissectors.modbus.exchange_columns import SAMPLES
 from dissectors.modbus.learned_timing import READ
 from dissectors.modbus.regular_exchanges import REFUSED, TO_ALL, UNANSWERED
 from dissectors.modbus.remembered import BEGIN, LAST_STANDARD_UNIT, OPEN_KEPT, SLOW_UNLEARNT, slow_limit
-from dissectors.modbus.response_groups import ANSWERS_KEPT, AnsweredRequest, SameRequest
+from dissectors.modbus.response_groups import AnsweredRequest, SameRequest
 from dissectors.modbus.station_record import Key, Requested, StationRecord
 from dissectors.tracker import Interval, Transaction
 
@@ -207,7 +207,7 @@ class StretchEvidence:
         self._count_all()
         for request in self._compared:
             if request.answers and request.same is not None:
-                request.same.answers.extend(map(one.answered, request.answers[-ANSWERS_KEPT:]))
+                request.same.add([one.answered(at) for at in request.same.needed(request.answers)])
                 request.answers.clear()
 
     # ---- what is rarer

@@ -52,13 +52,14 @@ _QUIET_NOISE = frozenset((Reason.ZEROS, Reason.BREAK, Reason.PAD))
 @dataclass(frozen=True, slots=True)
 class PassedBy:
     """Exchanges that went by the tracker. `first`: the request of the first. `newest`: the last that were answered, and
-    the last of all; `given_up`: the last that were not. `count`: of all. `end`: ns, of the last frame. `units`: that
-    were asked.
+    the last of all; `given_up`: the last that were not. `heard`: of each unit that answered, the last transaction that
+    it did. `count`: of all. `end`: ns, of the last frame. `units`: that were asked.
     """
 
     first: Seen
     newest: list[Exchange]
     given_up: list[Exchange]
+    heard: dict[int, int]
     count: int
     end: int
     units: set[int]
@@ -147,9 +148,11 @@ class ModbusTracker:
         request = Exchange(self._held.take_tx(), seen, sure, fault=fault)
         request.silent = is_listen_only(seen.octets) or (request.unit in self._mute and is_restart(seen.octets))
         if before is not None:
+            if before.unit == request.unit:
+                request.since = before.since
             if before.octets == seen.octets and not (before.fault or before.silent):
                 request.attempt, request.of = before.attempt + 1, before.of or before.tx
-            waited = before.gap(seen.frame.start)
+            before.waited = waited = before.gap(seen.frame.start)
             hasty = self.timeout is not None and waited < self.timeout // 2
             if before.remark is None and hasty:
                 before.remark = _IMPATIENT if before.sure else _PERHAPS_ANSWER
@@ -186,7 +189,7 @@ class ModbusTracker:
         late = self._held.late_for(seen)
         if request is not None:
             if request.is_for(seen.octets):
-                why = mismatch(request.octets, seen.octets)
+                why = None if request.fault else mismatch(request.octets, seen.octets)
                 before = self._held.repeats(request, seen) if why and late is None else None
                 if before is not None:
                     request.disturbed = True
@@ -418,7 +421,7 @@ class ModbusTracker:
         self.learnt.waited(went.unanswered)
         for _ in range(min(went.sure, MOST_VOTES)):
             self._echoes.learn(False)
-        self._held.pass_by(by.newest, by.given_up, by.count)
+        self._held.pass_by(by.newest, by.given_up, by.heard, by.count)
         self._last_end, self._last_was_answer = by.end, by.newest[-1].answered
         self._mute -= went.units
         self._units |= by.units
@@ -427,9 +430,9 @@ class ModbusTracker:
 
     def _answer(self, request: Exchange, seen: Seen, why: str | None) -> Placement:
         self._learn_from_answer(request, seen, why)
-        request.answered = True
         self._held.answered.append(request)
         self._held.drop_chain(Verdict.NO_RESPONSE)
+        self._held.note_answer(request)
         self._held.open, self._held.last = None, request
         self._mute.discard(seen.octets[0])
         self._held.closed.append(request.close_with(seen, why))

@@ -166,6 +166,22 @@ def unheard(parties: Sequence[str], share: float, plan: Scenario, seconds: float
     return session, items()
 
 
+def noisy_tap(party: str, share: float, plan: Scenario, seconds: float, tap: TapModel) -> Heard:
+    """A tap at which a bit of some frames of one sender is another, and nowhere else; exact times."""
+    session, _ = simulate(plan, seconds, tap)
+    dice = Random(f"noisy tap {plan.seed}")
+
+    def items() -> Iterator[Item]:
+        for burst in plan.wire().run(int(seconds * S)):
+            octets = bytearray(burst.octets)
+            if octets and burst.sent[0].party == party and dice.random() < share:
+                octets[dice.randrange(2, len(octets))] ^= 1 << dice.randrange(8)
+            if octets:
+                yield Chunk(burst.end, bytes(octets), burst.marks)
+
+    return session, items()
+
+
 def losing(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
     """A computer that loses a read now and then, and says so."""
     session, items = simulate(plan, seconds, tap)

@@ -40,6 +40,16 @@ def swapped_check(request: bytes, answer: bytes) -> bytes:
     return answer[:-2] + answer[-1:] + answer[-2:-1]
 
 
+def other_check(request: bytes, answer: bytes) -> bytes:
+    """The CRC begun with 0 and not with FFFF."""
+    check = 0
+    for octet in answer[:-2]:
+        check ^= octet
+        for _ in range(8):
+            check = check >> 1 ^ (0xA001 if check & 1 else 0)
+    return answer[:-2] + check.to_bytes(2, "little")
+
+
 def copied_before(request: bytes, answer: bytes) -> bytes:
     """The request once more, the answer directly behind it."""
     return request + answer

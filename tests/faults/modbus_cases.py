@@ -12,7 +12,7 @@ from dissectors.simulated_faults import BitFlips, Break, CutShort, LateResponse,
 from sniff.simulation.tap import CH340, FTDI, UART
 from tests.faults.buses import RTU_LINE, modbus
 from tests.faults.case import Case, Said
-from tests.faults.hearing import echoing, hidden_latency, of_party, sent_otherwise
+from tests.faults.hearing import echoing, hidden_latency, noisy_tap, of_party, sent_otherwise, unheard
 from tests.faults.misbehaving import (
     Rewrites,
     SpoiltFirst,
@@ -20,6 +20,7 @@ from tests.faults.misbehaving import (
     Trimmed,
     Unhurried,
     copied_before,
+    other_check,
     other_function,
     other_quantity,
     other_value,
@@ -150,6 +151,45 @@ MODBUS_CASES: tuple[Case, ...] = (
         partial(modbus, change={2: partial(Rewrites, rewrite=copied_before)}),
         (Said(("station 2", "bus"), ("LN205",), _COPY),),
         seeds=1,
+    ),
+    Case(
+        "RTU check of one station computed otherwise",
+        partial(modbus, change={2: partial(Rewrites, rewrite=other_check)}),
+        (("MB021", "station 2"),),
+        seeds=1,
+    ),
+    # what this tap alone does not hear
+    Case(
+        "RTU answers not heard here",
+        modbus,
+        (("MB020", "bus"),),
+        hear=partial(unheard, ("unit 1", "unit 2", "unit 3"), 0.2),
+        never=("MB001", "MB002", "MB003", "MB004"),
+        seeds=2,
+    ),
+    Case(
+        "RTU no answer heard here at all",
+        modbus,
+        (("MB020", "bus"),),
+        hear=partial(unheard, ("unit 1", "unit 2", "unit 3"), 1.0),
+        never=("MB001",),
+        seeds=1,
+    ),
+    Case(
+        "ASCII one station not heard here",
+        _ascii,
+        (("MB020", "bus"),),
+        hear=partial(unheard, ("unit 3",), 1.0),
+        never=("MB001", "MB003"),
+        seeds=1,
+    ),
+    Case(
+        "RTU requests damaged here alone",
+        modbus,
+        (("MB022", "bus"),),
+        hear=partial(noisy_tap, "master", 0.08),
+        never=("MB001",),
+        seeds=2,
     ),
     # answers that do not fit, requests that are wrong
     Case(

@@ -19,7 +19,7 @@ from dissectors.modbus import RTU
 from dissectors.modbus.envelope import readable_adu
 from dissectors.modbus.exchange import Exchange, Seen
 from dissectors.modbus.exchange_columns import ExchangeColumns, exchanges, placed
-from dissectors.modbus.exchange_memory import holding, passed
+from dissectors.modbus.exchange_memory import heard, holding, outlives, passed
 from dissectors.modbus.tracker import ModbusTracker, PassedBy
 from dissectors.tracker import Placement, Transaction
 from sniff import formats
@@ -54,7 +54,8 @@ def memory(tracker: ModbusTracker) -> dict[str, object]:
         "last": of(tracker._held.last),
         "last end": (tracker._last_end, tracker._last_was_answer),
         "answered": [of(one) for one in tracker._held.answered],
-        "given up": [of(one) for one in tracker._held.given_up],
+        "given up": [(of(one), one.waited, one.outlives) for one in tracker._held.given_up],
+        "heard": sorted(tracker._held.heard.items()),
         "echoes": (tracker._echoes.usual, tracker._echoes._votes),
         "others": (tracker._mute, tracker._units, tracker._held.only, tracker.next_tx),
     }
@@ -160,6 +161,8 @@ def _compare(
             before.next_tx + one - place, seen[int(found.request[one]) - first + at], bool(found.sure[one])
         )
         request.answered = bool(found.answered[one])
+        request.outlives = outlives(found, one, end)
+        request.waited = int(found.gap[one]) if found.unanswered[one] else None
         newest[one] = request
     if found.copy[end - 1]:
         newest[end - 1].copied = int(found.gap[end - 1])
@@ -167,6 +170,7 @@ def _compare(
         seen[at],
         [one for place_of, one in newest.items() if place_of in went.answered or place_of == end - 1],
         [newest[one] for one in went.given_up],
+        heard(went, place, before.next_tx),
         end - place,
         int(frames.end[last]),
         {int(unit) for unit in found.unit[place:end]} - {0},

@@ -80,6 +80,12 @@ def test_an_adapter_that_loses_the_first_octet_of_everything() -> None:
     assert [e.repair.octets if e.repair else None for e in found] == [ASKED, ANSWERED] * 4
 
 
+def test_a_master_that_swaps_the_check_of_everything() -> None:
+    swapped = SPOIL[Flaw.CHECK_SWAPPED](ASKED)
+    found = frames(read([swapped] * 4, gap=300))
+    assert [e.repair.octets if e.repair else None for e in found] == [ASKED] * 4
+
+
 def test_good_frames_have_no_repair() -> None:
     assert all(e.ok and e.repair is None for e in frames(read([ASKED, ANSWERED] * 4)))
 

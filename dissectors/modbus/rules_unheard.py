@@ -1,0 +1,37 @@
+"""The rule of answers that this tap does not hear, in words: what the master does tells that they came. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from dissectors.findings import Finding, Severity, Tally, counted
+from dissectors.modbus.bus_record import BusRecord
+from dissectors.modbus.finding_words import note_if, units
+from dissectors.modbus.rules import RULES
+
+
+def of_unheard(seen: BusRecord, unheard: Sequence[int]) -> Iterator[Finding]:
+    """One finding for all stations whose answers are missing here."""
+    if not unheard:
+        return
+    stations = [seen.stations[unit] for unit in unheard]
+    count, asked = sum(one.missing.count for one in stations), sum(one.asked for one in stations)
+    if seen.hears_nobody and len(stations) > 1:
+        words = (
+            f"no answer heard from anybody: {counted(count, 'request')} to {units(unheard)}, none of them sent again"
+        )
+        severity: Severity | None = Severity.ERROR
+    else:
+        words = (
+            f"no answer heard to {count} of {counted(asked, 'request')} to {units(unheard)}; the master went on as "
+            "after an answer, neither waiting nor asking again"
+        )
+        severity = note_if(seen.rare(count, asked))
+    tally = Tally()
+    for one in stations:
+        for no in one.missing.evidence:
+            tally.add(one.missing.first, no)
+    finding = tally.found(RULES["MB020"], "bus", words, severity)
+    last = max(one.missing.last for one in stations)
+    yield replace(finding, count=count, first=min(one.missing.first for one in stations), last=last)
