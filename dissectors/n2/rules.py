@@ -85,8 +85,8 @@ RULES: dict[str, Rule] = {
             "N2008",
             Severity.ERROR,
             "answered twice",
-            "A second, different good answer came to one command that was sent once. A single time it is only noted: a "
-            "command may not have been heard here.",
+            "A second, different good answer came to one command that was sent once, sooner than a command that was "
+            "missed at this tap would let one come. A single time it is only noted.",
             "two stations have the same address",
             "switch the station off and see whether something still answers",
             explains=("N2004", "N2011", "N2013", "N2014", "LN101", "LN103", "LN2"),
