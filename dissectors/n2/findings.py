@@ -22,6 +22,7 @@ from dissectors.n2.masters import Masters, OpenCommand
 from dissectors.n2.objects import region_name
 from dissectors.n2.record import Damages, N2StationRecord, Override
 from dissectors.n2.torn import TornFrames
+from dissectors.n2.unheard import Patience
 from dissectors.n2.wording import SLOW, N2Evidence, worded
 from dissectors.strikes import Strikes
 from dissectors.tracker import Placement, Transaction, Verdict
@@ -50,6 +51,7 @@ class N2Findings:
         self.master = Damages()
         self._asked: dict[int, OpenCommand] = {}  # by transaction
         self.masters = Masters()
+        self.patience = Patience()
         self.torn = TornFrames(timing)
         self.strikes = Strikes()
         self.late_speakers = LateSpeakers()
@@ -151,6 +153,7 @@ class N2Findings:
                 return  # the command that it answers was torn
             station.late.add(transaction.start, transaction.response)
             station.missing.take_back(transaction.of)
+            station.unheard.take_back(transaction.of)
             self.masters.see_late(transaction, station)
         elif asked is not None:
             self._settle_asked(station, asked, code, transaction)
@@ -162,6 +165,9 @@ class N2Findings:
         if transaction.response is None:
             if verdict is Verdict.NO_RESPONSE:
                 if self.torn.is_answered(transaction.request):
+                    return
+                if self.patience.tells(asked, transaction.attempt, self.masters.newest):
+                    station.unheard.add(transaction.id, transaction.end, transaction.request)
                     return
                 self.unanswered(transaction.station or 0, transaction.start, transaction.end, self.newest)
                 station.missing.add(transaction.id, transaction.end, transaction.request)

@@ -22,6 +22,7 @@ from dissectors.n2.commands import parse_command
 from dissectors.n2.findings import ANSWERS_KEPT, N2Findings, refusal_code
 from dissectors.n2.header import BROADCAST, meant
 from dissectors.n2.masters import HASTE, OpenCommand
+from dissectors.n2.unheard import ONLY_LOOKS, SAME
 from dissectors.n2.wording import SLOW
 from dissectors.row_columns import in_turn
 from dissectors.tracker import Verdict
@@ -37,8 +38,7 @@ _ANSWERED, _RETRY, _EXCEPTION, _NO_RESPONSE, _TO_ALL = (
     for verdict in (Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION, Verdict.NO_RESPONSE, Verdict.BROADCAST)
 )
 _COMMAND, _REFUSAL = ord(">"), ord("N")
-_IDENTIFY: Final = "identify"
-_REMEMBERED: Final = (_IDENTIFY, "warm-reset", "override", "release-override")
+_REMEMBERED: Final = (ONLY_LOOKS, "warm-reset", "override", "release-override")
 """Kinds of commands after which a station is another one than before."""
 
 
@@ -114,10 +114,12 @@ class _Judging:
         self.found = found = _regular(rows)
         self._closed = rows.transactions.take(found.stretches.transaction)
         names = rows.frames.names
-        self._is_identify = found.kind == (names.index(_IDENTIFY) if _IDENTIFY in names else NONE)
+        self._is_identify = found.kind == (names.index(ONLY_LOOKS) if ONLY_LOOKS in names else NONE)
         kinds = [at for at, name in enumerate(names) if name in _REMEMBERED]
         told = found.refused | (found.answered & np.isin(found.kind, kinds))
         slow = found.answered & (self._closed.least > SLOW)
+        self._again = _again(found, rows)
+        self._unheard = np.zeros(len(found.answered), bool)
         self._events = told | slow | ~(found.answered | found.to_all)
 
     def is_at_rest(self, begin: int, end: int) -> bool:
@@ -170,7 +172,7 @@ class _Judging:
         """What came while an answer was overdue, and what no answer came to."""
         judge, rows, found, start = self._judge, self._rows, self.found, self._closed.start
         late = judge.late_speakers
-        silent = ~(found.answered | found.to_all)
+        silent = ~(found.answered | found.to_all | self._unheard)
         at = begin
         while at < end:
             some = slice(at, min(at + _LOOKED_AT, end))
@@ -193,7 +195,11 @@ class _Judging:
         judge, rows, found, closed = self._judge, self._rows, self.found, self._closed
         station, place = judge.station(int(found.unit[at])), int(found.stretches.request[at])
         if not found.answered[at]:
-            station.missing.add(int(closed.id[at]), int(closed.end[at]), rows.first + place)
+            waited, kind = int(rows.frames.start[place + 1] - rows.frames.end[place]), rows.frames.names[found.kind[at]]
+            again, attempt = bool(self._again[at]), int(closed.attempt[at])
+            self._unheard[at] = unheard = judge.patience.is_unheard(waited, again, attempt, kind)
+            missed = station.unheard if unheard else station.missing
+            missed.add(int(closed.id[at]), int(closed.end[at]), rows.first + place)
             return
         least = int(closed.least[at])
         if least > SLOW:
@@ -215,6 +221,16 @@ class _Judging:
     def _octets(self, place: int) -> bytes:
         begin = int(self._rows.frames.offset[place])
         return self._rows.octets[begin : begin + int(self._rows.frames.length[place])].tobytes()
+
+
+def _again(found: _Regular, rows: RowColumns) -> Masks:
+    """Which were not answered, and the command behind asks the same."""
+    again: Masks = ~(found.answered | found.to_all)
+    which = np.flatnonzero(again)
+    asked, begins = found.stretches.request[which], np.arange(SAME)
+    one, other = (rows.octets[rows.frames.offset[place][:, None] + begins] for place in (asked, asked + 1))
+    again[which] = (one == other).all(axis=1)
+    return again
 
 
 def _add(

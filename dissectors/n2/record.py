@@ -115,6 +115,7 @@ class N2StationRecord:
     refused_while_reset: int = 0
     sent: Damages = field(default_factory=Damages)
     missing: Missing = field(default_factory=Missing)
+    unheard: Missing = field(default_factory=Missing)  # the same, where the master had an answer
     resets: Tally = field(default_factory=Tally)
     slow: Tally = field(default_factory=Tally)
     again: Tally = field(default_factory=Tally)

@@ -57,9 +57,11 @@ RULES: dict[str, Rule] = {
             "no answer",
             "Commands that no answer followed, not even a late one. An error where the master turned to a station "
             "several times, or over 11 times at once, and got none. A single turn is only noted, or fewer than 1 in "
-            "100 and at most two a minute; and so are many addresses that are only asked who they are: a scan.",
-            "station off, wrong address or wrong baud rate, or a broken wire",
-            "check its supply, address and wiring; take it out of the master's list when it is gone",
+            "100 and at most two a minute; and so are many addresses that are only asked who they are: a scan. Where "
+            "several are asked and nobody but the master is heard, one finding names the bus.",
+            "station off, wrong address or wrong baud rate, or a broken wire; all of them: one between them and here",
+            "check its supply, address and wiring, and whether the master has its values: then only this tap does not "
+            "hear it",
         ),
         Rule(
             "N2006",
@@ -79,7 +81,7 @@ RULES: dict[str, Rule] = {
             "master does that. At least two such.",
             "two masters on one bus, or a commissioning tool beside the controller",
             "find the second master and take it off",
-            explains=("N2004", "N2005", "N2008", "N2010", "N2011", "N2013", "N2014", "LN1", "LN2"),
+            explains=("N2004", "N2005", "N2008", "N2010", "N2011", "N2013", "N2014", "N2015", "LN1", "LN2"),
         ),
         Rule(
             "N2008",
@@ -114,7 +116,7 @@ RULES: dict[str, Rule] = {
             "Answers without a command before them, or after the master had gone on.",
             "a master that is not heard at this place of the bus, or a station far slower than the master's timeout",
             "compare the answer times with the master's timeout; move the tap",
-            explains=("N2005", "N2003", "LN1", "LN2"),
+            explains=("N2005", "N2003", "N2015", "LN1", "LN2"),
         ),
         Rule(
             "N2012",
@@ -150,6 +152,19 @@ RULES: dict[str, Rule] = {
             "the station answers when its master has given up; those whose frames are hit are not to blame",
             "raise the message timeout of the master, or find out why this station is slow; nobody else's cable",
             explains=("N2003", "N2004", "N2005", "N2006", "N2011", "LN1", "LN2"),
+        ),
+        Rule(
+            "N2015",
+            Severity.WARNING,
+            "answers not heard here",
+            "Commands without an answer, behind which the master asks something else after one try, within three "
+            "quarters of the shortest time that it waited before it repeated one (of 250 ms, the least that an NAE can "
+            "be given, where it repeated none). So it had an answer. Asking who is there does not count. A single one, "
+            "or fewer than 1 in 100 and at most two a minute, is only noted.",
+            "a tap that does not hear what the master does: behind a repeater, on one pair of a four-wire line, loose; "
+            "no station is to blame",
+            "move the tap towards the stations that are not heard; where none is, listen on the other pair",
+            explains=("N2005",),
         ),
     )
 }

@@ -78,6 +78,10 @@ def _swapped(octets: bytes) -> bytes:
     return octets[:-3] + octets[-2:-1] + octets[-3:-2] + octets[-1:] if len(octets) > 4 else octets
 
 
+def _nothing(octets: bytes) -> bytes:
+    return b""
+
+
 _INNOCENT = ("N2007", "N2008")
 _DRIVE = (("N2012", "station 2"),)
 
@@ -99,6 +103,21 @@ N2_RULE_CASES: tuple[Case, ...] = (
         partial(impatient, (LateResponse(0.06, 300 * MS, ("drive 2",)),)),
         (("N2011", "station 2"),),
         never=_INNOCENT,
+    ),
+    Case(
+        "N2 one drive not heard here",
+        n2,
+        (("N2015", "bus"),),
+        hear=partial(_edited, _nothing, ("drive 2",)),
+        never=("N2005", *_INNOCENT),
+    ),
+    Case(
+        "N2 only the master heard",
+        n2,
+        (("N2015", "bus"),),
+        hear=partial(_edited, _nothing, ("drive 1", "drive 2")),
+        never=("N2005", *_INNOCENT),
+        seeds=1,
     ),
     Case("N2 bit errors everywhere", partial(n2, (BitFlips(4e-3),)), (("N2004", "bus"),), never=_INNOCENT),
     Case(
