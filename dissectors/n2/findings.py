@@ -16,6 +16,7 @@ from dissectors.frame import Damage, Event, Frame, Header, Noise
 from dissectors.late_speakers import Due, LateSpeakers, reaching
 from dissectors.line import Timing
 from dissectors.n2.commands import parse_command
+from dissectors.n2.envelope import check_off
 from dissectors.n2.header import meant
 from dissectors.n2.late import of_late_speakers
 from dissectors.n2.masters import Masters, OpenCommand
@@ -117,7 +118,7 @@ class N2Findings:
         if self.torn.is_late(event) or self.torn.completes(no):
             return  # its begin was read before, or may have been
         self.strikes.struck(name)
-        sender.add_bad(event.end, no, event.repair.flaw if event.repair is not None else None)
+        sender.add_bad(event.end, no, event.repair.flaw if event.repair is not None else check_off(event.octets))
         self.torn.struck(sender)
 
     def keep_answer(self, transaction: int, octets: bytes) -> None:
@@ -174,6 +175,7 @@ class N2Findings:
             elif verdict is Verdict.DAMAGED_ANSWER and not self.torn.is_torn(transaction.id, transaction.request):
                 self.strikes.struck(f"station {transaction.station}")
                 self._see_hit(transaction)
+                station.sent.frames += 1  # in pieces
                 station.sent.add_bad(transaction.end, transaction.request)
             return
         if verdict is Verdict.DAMAGED_ANSWER:

@@ -123,7 +123,8 @@ RULES: dict[str, Rule] = {
             Severity.ERROR,
             "damaged always in the same way",
             "At least three damaged frames of one sender, and 4 in 5 of all its damaged ones, are right but for one "
-            "and the same thing: the first or the last octet missing or spoilt, or the two checksum digits swapped. "
+            "and the same thing: the first or the last octet missing or spoilt, the two checksum digits swapped, or "
+            "(six at least) the checksum wrong by one and the same number. "
             "What they were follows from the checksum and from what was asked, and is shown, marked as repaired. Where "
             "all stations have it, or the only one that is heard lacks its first or last octet, one finding names "
             "the bus. A warning where fewer than half of its frames have it.",

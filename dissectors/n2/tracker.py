@@ -250,6 +250,8 @@ class N2Tracker:
         if owing is not None:
             self._forget(owing)
             return self._separate(no, frame, header, Verdict.LATE, owing, closed)
+        missed = self._missed
+        perhaps_late = missed is not None and missed.is_owed and missed.station != open_.station
         self._open, self._missed, self._done = None, None, open_
         open_.answer, open_.answer_end = frame.octets, frame.end
         if not open_.echoed:
@@ -260,7 +262,7 @@ class N2Tracker:
             verdict = Verdict.DAMAGED_REQUEST
         if header.kind == "negative-acknowledge":
             verdict = Verdict.EXCEPTION
-        if open_.station is not None and open_.station in self._known:
+        if open_.station is not None and open_.station in self._known and not perhaps_late:
             self._times.setdefault(open_.station, _Times()).add(latency)
         done = closed_exchange(open_, verdict, error=header.error)
         closed.append(replace(done, response=no, end=frame.end, latency=latency))

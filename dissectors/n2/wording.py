@@ -25,6 +25,9 @@ OVERRIDE_AGE = 600 * NS_PER_S
 ALIKE = 3
 """So many frames of one sender damaged in the same way are no chance, where 4 in 5 of its damaged ones are."""
 
+ALIKE_OFF = 6
+"""The same of checksums that are wrong by one and the same number: single bits are often wrong by the same."""
+
 TRIES = 11
 """Most commands of one turn to a station: a first one and the most retries that an NAE can be given (3 to 10)."""
 
@@ -130,22 +133,23 @@ def _alike(heard: N2Evidence) -> Iterator[Finding]:
         yield tally.found(RULES["N2012"], name, seen, severity)
 
 
-def _flaw(sent: Damages) -> Flaw | None:
+def _flaw(sent: Damages) -> Flaw | int | None:
     """The flaw that nearly all damaged frames of a sender have."""
     for flaw, tally in sent.flaws.items():
-        if tally.count >= ALIKE and 5 * tally.count >= 4 * sent.bad.count:
+        least = ALIKE if isinstance(flaw, Flaw) else ALIKE_OFF
+        if tally.count >= least and 5 * tally.count >= 4 * sent.bad.count:
             return flaw
     return None
 
 
-def _only_flaw(sent: Damages) -> Flaw | None:
+def _only_flaw(sent: Damages) -> Flaw | int | None:
     """The flaw that all frames of a sender of few have."""
     flaws = [flaw for flaw, tally in sent.flaws.items() if tally.count == sent.frames]
     return flaws[0] if len(flaws) == 1 else None
 
 
-def _flaw_words(flaw: Flaw) -> str:
-    return f"always the same: {flaw.value}"
+def _flaw_words(flaw: Flaw | int) -> str:
+    return f"always the same: {flaw.value if isinstance(flaw, Flaw) else f'checksum {flaw:02X}h too large'}"
 
 
 # --- who is not there ---

@@ -73,3 +73,20 @@ def test_a_master_without_answer_is_no_relay() -> None:
             bus.say(command, after=50 * MS)
             bus.say(command, after=50 * MS)
     assert Verdict.ECHO not in bus.verdicts()
+
+
+def in_another_turn(bus: Bus) -> None:
+    """The late answer to a command to 1, right behind the next one, to 16."""
+    bus.say(READ, after=60 * MS)
+    bus.say(READ_OTHER, after=270 * MS)
+    bus.say(VALUE, after=MS)
+
+
+def test_a_late_answer_does_not_teach_how_soon_another_station_answers() -> None:
+    bus = Bus()
+    for _ in range(2):
+        for _ in range(10):
+            bus.say(READ_OTHER, after=60 * MS)
+            bus.say(VALUE, after=30 * MS)
+        in_another_turn(bus)
+    assert bus.verdicts()[-2:] == [Verdict.LATE, Verdict.OPEN]
