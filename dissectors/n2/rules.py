@@ -49,7 +49,7 @@ RULES: dict[str, Rule] = {
             "most two a minute, is only noted: Johnson Controls calls up to two a minute tolerable.",
             "noise, wrong termination or bias, or two that talk at once",
             "if one station only: its stub, its connector; if all: termination, bias, ground",
-            explains=("N2005",),
+            explains=("N2005", "LN101", "LN103", "LN204"),
         ),
         Rule(
             "N2005",
