@@ -94,7 +94,9 @@ class N2Findings:
                 self.station(placement.destination).turns += 1
             self.turn = placement.destination
         elif event.damage is not Damage.RESTARTED or event.repair is not None:
-            self._add_bad("master", self.master, no, event)
+            counts = self._add_bad("master", self.master, no, event)
+            if counts and before is not None and before in self.stations and event.repair is None:
+                self.stations[before].behind.add(event.start, no)
 
     def _see_answer(self, no: int, event: Frame, header: Header, placement: Placement) -> None:
         self.masters.see_other()
@@ -114,12 +116,14 @@ class N2Findings:
         if not header.ok:
             self._add_bad(f"station {placement.source}", sent, no, event)
 
-    def _add_bad(self, name: str, sender: Damages, no: int, event: Frame) -> None:
+    def _add_bad(self, name: str, sender: Damages, no: int, event: Frame) -> bool:
+        """Count a damaged frame, where it is whole; whether it was."""
         if self.torn.is_late(event) or self.torn.completes(no):
-            return  # its begin was read before, or may have been
+            return False  # its begin was read before, or may have been
         self.strikes.struck(name)
         sender.add_bad(event.end, no, event.repair.flaw if event.repair is not None else check_off(event.octets))
         self.torn.struck(sender)
+        return True
 
     def keep_answer(self, transaction: int, octets: bytes) -> None:
         """Remember a good answer for a while."""

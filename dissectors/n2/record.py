@@ -116,6 +116,7 @@ class N2StationRecord:
     refused_while_reset: int = 0
     sent: Damages = field(default_factory=Damages)
     missing: Missing = field(default_factory=Missing)
+    behind: Tally = field(default_factory=Tally)  # damaged commands directly behind one to it that nothing followed
     unheard: Missing = field(default_factory=Missing)  # the same, where the master had an answer
     resets: Tally = field(default_factory=Tally)
     slow: Tally = field(default_factory=Tally)

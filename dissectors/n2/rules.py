@@ -148,7 +148,8 @@ RULES: dict[str, Rule] = {
             Severity.WARNING,
             "answers into what comes next",
             "Damage that stands while the answer of one station is overdue, at least three times, and far more often "
-            "then than in frames of the same senders elsewhere (chance under 1 in 500). An answer after the master's "
+            "then than in frames of the same senders elsewhere (chance under 1 in 500); or commands of which so many "
+            "are damaged directly behind one to it that nothing followed. An answer after the master's "
             "timeout falls on the next command or on the answer to it, and two senders at once are no frame.",
             "the station answers when its master has given up; those whose frames are hit are not to blame",
             "raise the message timeout of the master, or find out why this station is slow; nobody else's cable",
