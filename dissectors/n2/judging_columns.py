@@ -22,7 +22,7 @@ from dissectors.n2.commands import parse_command
 from dissectors.n2.findings import ANSWERS_KEPT, N2Findings, refusal_code
 from dissectors.n2.header import BROADCAST, meant
 from dissectors.n2.masters import HASTE, OpenCommand
-from dissectors.n2.unheard import ONLY_LOOKS, SAME
+from dissectors.n2.unheard import ONLY_LOOKS
 from dissectors.n2.wording import SLOW
 from dissectors.row_columns import in_turn
 from dissectors.tracker import Verdict
@@ -118,7 +118,6 @@ class _Judging:
         kinds = [at for at, name in enumerate(names) if name in _REMEMBERED]
         told = found.refused | (found.answered & np.isin(found.kind, kinds))
         slow = found.answered & (self._closed.least > SLOW)
-        self._again = _again(found, rows)
         self._unheard = np.zeros(len(found.answered), bool)
         self._events = told | slow | ~(found.answered | found.to_all)
 
@@ -196,8 +195,8 @@ class _Judging:
         station, place = judge.station(int(found.unit[at])), int(found.stretches.request[at])
         if not found.answered[at]:
             waited, kind = int(rows.frames.start[place + 1] - rows.frames.end[place]), rows.frames.names[found.kind[at]]
-            again, attempt = bool(self._again[at]), int(closed.attempt[at])
-            self._unheard[at] = unheard = judge.patience.is_unheard(waited, again, attempt, kind)
+            again = self._octets(place) == self._octets(place + 1)
+            self._unheard[at] = unheard = judge.patience.is_unheard(waited, again, int(closed.attempt[at]), kind)
             missed = station.unheard if unheard else station.missing
             missed.add(int(closed.id[at]), int(closed.end[at]), rows.first + place)
             return
@@ -221,16 +220,6 @@ class _Judging:
     def _octets(self, place: int) -> bytes:
         begin = int(self._rows.frames.offset[place])
         return self._rows.octets[begin : begin + int(self._rows.frames.length[place])].tobytes()
-
-
-def _again(found: _Regular, rows: RowColumns) -> Masks:
-    """Which were not answered, and the command behind asks the same."""
-    again: Masks = ~(found.answered | found.to_all)
-    which = np.flatnonzero(again)
-    asked, begins = found.stretches.request[which], np.arange(SAME)
-    one, other = (rows.octets[rows.frames.offset[place][:, None] + begins] for place in (asked, asked + 1))
-    again[which] = (one == other).all(axis=1)
-    return again
 
 
 def _add(

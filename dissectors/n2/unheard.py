@@ -9,13 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from dissectors.line import MS
-from dissectors.n2.masters import OpenCommand
+from dissectors.n2.masters import HASTE, OpenCommand
 
 SOON = 250 * MS
 """Shortest message timeout that an NAE can be given, ns (JCI help, N2 trunk)."""
-
-SAME = 6
-"""Octets of two commands that tell whether they ask the same: start, address, command and what it asks."""
 
 ONLY_LOOKS = "identify"
 """Kind of the command that asks who is there."""
@@ -30,10 +27,11 @@ class Patience:
     def is_unheard(self, waited: int, is_again: bool, attempt: int, kind: str) -> bool:
         """Whether the next command, `waited` ns behind an unanswered one, shows that it was answered.
 
-        `is_again`: it asks the same. `attempt`, `kind`: of the unanswered one.
+        `is_again`: it is the same. `attempt`, `kind`: of the unanswered one.
         """
         if is_again:
-            self.shortest = min(self.shortest, waited)
+            if waited >= HASTE:  # else it was given again, or asked twice
+                self.shortest = min(self.shortest, waited)
             return False
         return attempt == 1 and kind != ONLY_LOOKS and 4 * waited < 3 * self.shortest
 
@@ -41,5 +39,5 @@ class Patience:
         """The same of frames; `then`: the newest command behind the unanswered one."""
         if then is None or then.row != asked.row + 1 or not (asked.frame.ok and then.frame.ok):
             return False
-        again = asked.frame.octets[:SAME] == then.frame.octets[:SAME]
+        again = asked.frame.octets == then.frame.octets
         return self.is_unheard(then.frame.start - asked.frame.end, again, attempt, asked.command.type.kind)

@@ -17,8 +17,8 @@ SPOILT = b">031102@\x08140000E9\r"
 """A command to 3 that an answer fell on."""
 
 
-def told(turns: list[list[bytes]]) -> set[tuple[str, str]]:
-    """What is said as a warning at least of turns of one station each: a command, and what follows it after 12 ms."""
+def told(turns: list[list[bytes]], wait: int = 270) -> set[tuple[str, str]]:
+    """What is said as a warning at least of turns, `wait` ms apart: a command, and what follows it after 12 ms."""
     judge, engine, now = N2Findings(Timing(LINE)), Engine(N2, Timing(LINE)), 10**12
 
     def take(output: Output) -> None:
@@ -29,7 +29,7 @@ def told(turns: list[list[bytes]]) -> set[tuple[str, str]]:
 
     for turn in turns:
         for at, octets in enumerate(turn):
-            now += (12 if at else 270) * MS + len(octets) * LINE.char
+            now += (12 if at else wait) * MS + len(octets) * LINE.char
             take(engine.feed(Chunk(now, octets)))
     take(engine.close())
     return {(one.code, one.subject) for one in judge.findings() if one.severity >= Severity.WARNING}
@@ -48,3 +48,11 @@ def test_commands_damaged_behind_one_to_it_show_who_is_late(late: list[list[byte
     for _ in range(8):
         turns += [asked(1), asked(3), asked(1), asked(3), *late]
     assert (("N2014", "station 2") in told(turns)) is is_told
+
+
+@pytest.mark.parametrize(("wait", "is_told"), [(60, True), (400, False)])
+def test_a_master_that_asks_for_the_next_point_soon_had_its_answer(wait: int, is_told: bool) -> None:
+    """Several points of one station in a row: the next one is no repeat."""
+    commands = [make_command(f"0211{point:02X}03") for point in (1, 2, 3)] * 6
+    found = told([asked(1), *([one] for one in commands), asked(1)], wait)
+    assert found == {("N2015", "bus") if is_told else ("N2005", "station 2")}
