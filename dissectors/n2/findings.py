@@ -19,7 +19,7 @@ from dissectors.n2.commands import parse_command
 from dissectors.n2.envelope import check_off
 from dissectors.n2.header import meant
 from dissectors.n2.late import of_late_speakers
-from dissectors.n2.masters import Masters, OpenCommand
+from dissectors.n2.masters import HASTE, Masters, OpenCommand
 from dissectors.n2.objects import region_name
 from dissectors.n2.record import Damages, N2StationRecord, Override
 from dissectors.n2.torn import TornFrames
@@ -84,7 +84,7 @@ class N2Findings:
 
     def _see_command(self, no: int, event: Frame, header: Header, placement: Placement) -> None:
         asked = OpenCommand(no, event, parse_command(meant(event)))
-        before = self.masters.last_station
+        before, last = self.masters.last_station, self.masters.newest
         self.masters.see_command(asked, self.stations.get(before) if before is not None else None)
         self._asked[placement.tx] = asked
         self.master.frames += 1
@@ -95,7 +95,8 @@ class N2Findings:
             self.turn = placement.destination
         elif event.damage is not Damage.RESTARTED or event.repair is not None:
             counts = self._add_bad("master", self.master, no, event)
-            if counts and before is not None and before in self.stations and event.repair is None:
+            gave_up = last is not None and event.start - last.frame.end >= HASTE
+            if counts and gave_up and before in self.stations and event.repair is None:
                 self.stations[before].behind.add(event.start, no)
 
     def _see_answer(self, no: int, event: Frame, header: Header, placement: Placement) -> None:

@@ -43,6 +43,6 @@ def _is_behind(heard: N2Evidence, station: N2StationRecord) -> bool:
     struck, bad, commands = station.behind.count, heard.master.bad.count, heard.master.frames
     silent = station.missing.count + station.late.count
     is_there = station.answered or station.late.count or station.sent.bad.count
-    if not LEAST <= struck <= bad or not is_there or not silent < commands:
+    if not LEAST <= struck <= bad or 5 * struck < 4 * bad or not is_there or not silent < commands:
         return False
     return at_least(struck, bad, silent / commands) < SELDOM
