@@ -48,7 +48,6 @@ def test_commands_damaged_behind_one_to_it_show_who_is_late(late: list[list[byte
     for _ in range(8):
         turns += [asked(1), asked(3), asked(1), asked(3), *late]
     assert (("N2014", "station 2") in told(turns)) is is_told
-    assert ("N2014", "station 2") not in told(turns, 20)  # so soon no master gives up: a second one
 
 
 @pytest.mark.parametrize(("wait", "is_told"), [(60, True), (400, False)])
