@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from math import sqrt
 from typing import Final
 
@@ -31,7 +31,7 @@ def blamed(senders: Mapping[str, Damages], strikes: Strikes) -> dict[str, Tally]
         ((name, _),) = struck.items()
         if (left[name].octets / octets) ** strikes.of(name, left[name].bad.count) <= SELDOM_ALONE:
             return named | struck
-    return named | ({"bus": _together(struck)} if struck else {})
+    return named | ({"bus": together(struck.values())} if struck else {})
 
 
 def _outstanding(senders: Mapping[str, Damages], strikes: Strikes) -> str | None:
@@ -49,12 +49,12 @@ def _outstanding(senders: Mapping[str, Damages], strikes: Strikes) -> str | None
     return worst[1] if worst is not None else None
 
 
-def _together(tallies: Mapping[str, Tally]) -> Tally:
-    """Several tallies as one."""
+def together(tallies: Collection[Tally]) -> Tally:
+    """Several tallies as one; there must be one."""
     both = Tally(
-        sum(one.count for one in tallies.values()),
-        min(one.first for one in tallies.values()),
-        max(one.last for one in tallies.values()),
+        sum(one.count for one in tallies),
+        min(one.first for one in tallies),
+        max(one.last for one in tallies),
     )
-    both.evidence = sorted({frame for one in tallies.values() for frame in one.evidence})
+    both.evidence = sorted({frame for one in tallies for frame in one.evidence})
     return both

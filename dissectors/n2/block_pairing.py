@@ -70,9 +70,13 @@ class N2BlockPairing:
             return None
         last = int(asked[-1])
         made = self._made(asked, no - begin)
+        start, end = self._frames.start, self._frames.end
+        pauses = start[asked[1:]] - end[asked[:-1] + 1]
         self._tracker.pass_by(
             len(asked),
             times,
+            int(start[asked[0]]),
+            max(0, int(pauses.min())) if len(pauses) else None,
             (no + last - begin, self._frame(last), self._frames.header(last, PROTOCOL)),
             self._frame(last + 1),
         )

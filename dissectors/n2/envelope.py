@@ -61,6 +61,13 @@ def _judge_sum(octets: bytes, body: bytes) -> tuple[Check, Damage | None]:
     return Check.BAD, Damage.CHECK
 
 
+def check_off(octets: bytes) -> int | None:
+    """By how much the checksum of a whole frame is too large, modulo 256, where nothing else is wrong with it."""
+    if octets[:1] not in (b">", b"A") or judge(octets)[1] is not Damage.CHECK:
+        return None
+    return (int(octets[-3:-1], 16) - sum8(octets[1:-3])) & 0xFF
+
+
 def is_good(octets: bytes) -> bool:
     """Whether a whole frame is right by a check of its own."""
     return judge(octets) == (Check.GOOD, None)

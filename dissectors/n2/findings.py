@@ -16,12 +16,14 @@ from dissectors.frame import Damage, Event, Frame, Header, Noise
 from dissectors.late_speakers import Due, LateSpeakers, reaching
 from dissectors.line import Timing
 from dissectors.n2.commands import parse_command
+from dissectors.n2.envelope import check_off
 from dissectors.n2.header import meant
 from dissectors.n2.late import of_late_speakers
-from dissectors.n2.masters import Masters, OpenCommand
+from dissectors.n2.masters import HASTE, Masters, OpenCommand
 from dissectors.n2.objects import region_name
 from dissectors.n2.record import Damages, N2StationRecord, Override
 from dissectors.n2.torn import TornFrames
+from dissectors.n2.unheard import Patience
 from dissectors.n2.wording import SLOW, N2Evidence, worded
 from dissectors.strikes import Strikes
 from dissectors.tracker import Placement, Transaction, Verdict
@@ -50,6 +52,7 @@ class N2Findings:
         self.master = Damages()
         self._asked: dict[int, OpenCommand] = {}  # by transaction
         self.masters = Masters()
+        self.patience = Patience()
         self.torn = TornFrames(timing)
         self.strikes = Strikes()
         self.late_speakers = LateSpeakers()
@@ -81,7 +84,7 @@ class N2Findings:
 
     def _see_command(self, no: int, event: Frame, header: Header, placement: Placement) -> None:
         asked = OpenCommand(no, event, parse_command(meant(event)))
-        before = self.masters.last_station
+        before, last = self.masters.last_station, self.masters.newest
         self.masters.see_command(asked, self.stations.get(before) if before is not None else None)
         self._asked[placement.tx] = asked
         self.master.frames += 1
@@ -91,7 +94,10 @@ class N2Findings:
                 self.station(placement.destination).turns += 1
             self.turn = placement.destination
         elif event.damage is not Damage.RESTARTED or event.repair is not None:
-            self._add_bad("master", self.master, no, event)
+            counts = self._add_bad("master", self.master, no, event)
+            gave_up = last is not None and event.start - last.frame.end >= HASTE
+            if counts and gave_up and before in self.stations and event.repair is None:
+                self.stations[before].behind.add(event.start, no)
 
     def _see_answer(self, no: int, event: Frame, header: Header, placement: Placement) -> None:
         self.masters.see_other()
@@ -111,12 +117,14 @@ class N2Findings:
         if not header.ok:
             self._add_bad(f"station {placement.source}", sent, no, event)
 
-    def _add_bad(self, name: str, sender: Damages, no: int, event: Frame) -> None:
+    def _add_bad(self, name: str, sender: Damages, no: int, event: Frame) -> bool:
+        """Count a damaged frame, where it is whole; whether it was."""
         if self.torn.is_late(event) or self.torn.completes(no):
-            return  # its begin was read before, or may have been
+            return False  # its begin was read before, or may have been
         self.strikes.struck(name)
-        sender.add_bad(event.end, no, event.repair.flaw if event.repair is not None else None)
+        sender.add_bad(event.end, no, event.repair.flaw if event.repair is not None else check_off(event.octets))
         self.torn.struck(sender)
+        return True
 
     def keep_answer(self, transaction: int, octets: bytes) -> None:
         """Remember a good answer for a while."""
@@ -151,6 +159,7 @@ class N2Findings:
                 return  # the command that it answers was torn
             station.late.add(transaction.start, transaction.response)
             station.missing.take_back(transaction.of)
+            station.unheard.take_back(transaction.of)
             self.masters.see_late(transaction, station)
         elif asked is not None:
             self._settle_asked(station, asked, code, transaction)
@@ -163,11 +172,15 @@ class N2Findings:
             if verdict is Verdict.NO_RESPONSE:
                 if self.torn.is_answered(transaction.request):
                     return
+                if self.patience.tells(asked, transaction.attempt, self.masters.newest):
+                    station.unheard.add(transaction.id, transaction.end, transaction.request)
+                    return
                 self.unanswered(transaction.station or 0, transaction.start, transaction.end, self.newest)
                 station.missing.add(transaction.id, transaction.end, transaction.request)
             elif verdict is Verdict.DAMAGED_ANSWER and not self.torn.is_torn(transaction.id, transaction.request):
                 self.strikes.struck(f"station {transaction.station}")
                 self._see_hit(transaction)
+                station.sent.frames += 1  # in pieces
                 station.sent.add_bad(transaction.end, transaction.request)
             return
         if verdict is Verdict.DAMAGED_ANSWER:

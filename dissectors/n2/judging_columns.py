@@ -22,6 +22,7 @@ from dissectors.n2.commands import parse_command
 from dissectors.n2.findings import ANSWERS_KEPT, N2Findings, refusal_code
 from dissectors.n2.header import BROADCAST, meant
 from dissectors.n2.masters import HASTE, OpenCommand
+from dissectors.n2.unheard import ONLY_LOOKS
 from dissectors.n2.wording import SLOW
 from dissectors.row_columns import in_turn
 from dissectors.tracker import Verdict
@@ -37,8 +38,7 @@ _ANSWERED, _RETRY, _EXCEPTION, _NO_RESPONSE, _TO_ALL = (
     for verdict in (Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION, Verdict.NO_RESPONSE, Verdict.BROADCAST)
 )
 _COMMAND, _REFUSAL = ord(">"), ord("N")
-_IDENTIFY: Final = "identify"
-_REMEMBERED: Final = (_IDENTIFY, "warm-reset", "override", "release-override")
+_REMEMBERED: Final = (ONLY_LOOKS, "warm-reset", "override", "release-override")
 """Kinds of commands after which a station is another one than before."""
 
 
@@ -114,10 +114,11 @@ class _Judging:
         self.found = found = _regular(rows)
         self._closed = rows.transactions.take(found.stretches.transaction)
         names = rows.frames.names
-        self._is_identify = found.kind == (names.index(_IDENTIFY) if _IDENTIFY in names else NONE)
+        self._is_identify = found.kind == (names.index(ONLY_LOOKS) if ONLY_LOOKS in names else NONE)
         kinds = [at for at, name in enumerate(names) if name in _REMEMBERED]
         told = found.refused | (found.answered & np.isin(found.kind, kinds))
         slow = found.answered & (self._closed.least > SLOW)
+        self._unheard = np.zeros(len(found.answered), bool)
         self._events = told | slow | ~(found.answered | found.to_all)
 
     def is_at_rest(self, begin: int, end: int) -> bool:
@@ -170,7 +171,7 @@ class _Judging:
         """What came while an answer was overdue, and what no answer came to."""
         judge, rows, found, start = self._judge, self._rows, self.found, self._closed.start
         late = judge.late_speakers
-        silent = ~(found.answered | found.to_all)
+        silent = ~(found.answered | found.to_all | self._unheard)
         at = begin
         while at < end:
             some = slice(at, min(at + _LOOKED_AT, end))
@@ -193,7 +194,11 @@ class _Judging:
         judge, rows, found, closed = self._judge, self._rows, self.found, self._closed
         station, place = judge.station(int(found.unit[at])), int(found.stretches.request[at])
         if not found.answered[at]:
-            station.missing.add(int(closed.id[at]), int(closed.end[at]), rows.first + place)
+            waited, kind = int(rows.frames.start[place + 1] - rows.frames.end[place]), rows.frames.names[found.kind[at]]
+            again = self._octets(place) == self._octets(place + 1)
+            self._unheard[at] = unheard = judge.patience.is_unheard(waited, again, int(closed.attempt[at]), kind)
+            missed = station.unheard if unheard else station.missing
+            missed.add(int(closed.id[at]), int(closed.end[at]), rows.first + place)
             return
         least = int(closed.least[at])
         if least > SLOW:

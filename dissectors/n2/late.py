@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Final
 
-from dissectors.findings import Finding
+from dissectors.chances import at_least
+from dissectors.findings import Finding, counted
 from dissectors.late_speakers import MASTER, NOBODY, Heard, LateSpeakers, late_speakers, told
+from dissectors.n2.record import N2StationRecord
 from dissectors.n2.rules import RULES
 from dissectors.n2.wording import N2Evidence
+
+LEAST: Final = 3
+"""Damaged commands behind unanswered ones, before anything is said."""
+
+SELDOM: Final = 0.002
 
 
 def of_late_speakers(heard: N2Evidence, late: LateSpeakers) -> Iterator[Finding]:
@@ -16,6 +24,25 @@ def of_late_speakers(heard: N2Evidence, late: LateSpeakers) -> Iterator[Finding]
     whole = {f"station {address}": one.answered for address, one in heard.stations.items()}
     whole[MASTER] = whole[NOBODY] = heard.master.frames - heard.master.bad.count
     known = {address: Heard(one.answered, one.late.count, one.missing.count) for address, one in heard.stations.items()}
+    told_of: set[int] = set()
     for one in late_speakers(late, whole, known):
+        told_of.add(one.station)
         made = one.window.damage.found(RULES["N2014"], f"station {one.station}", told(one))
         yield replace(made, stations=(one.station, *sorted({*one.stations_hit, *one.silenced} - {one.station})))
+    for address, station in sorted(heard.stations.items()):
+        if address not in told_of and _is_behind(heard, station):
+            seen = (
+                f"{station.behind.count} of {counted(heard.master.bad.count, 'damaged command')} came directly behind "
+            )
+            seen += "a command to it that nothing had followed"
+            yield station.behind.found(RULES["N2014"], f"station {address}", seen)
+
+
+def _is_behind(heard: N2Evidence, station: N2StationRecord) -> bool:
+    """Whether damaged commands stand behind unanswered ones to a station that is there, more than chance explains."""
+    struck, bad, commands = station.behind.count, heard.master.bad.count, heard.master.frames
+    silent = station.missing.count + station.late.count
+    is_there = station.answered or station.late.count or station.sent.bad.count
+    if not LEAST <= struck <= bad or 5 * struck < 4 * bad or not is_there or not silent < commands:
+        return False
+    return at_least(struck, bad, silent / commands) < SELDOM

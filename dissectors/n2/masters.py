@@ -82,6 +82,11 @@ class Masters:
         return self._last is None
 
     @property
+    def newest(self) -> OpenCommand | None:
+        """The newest command, while nothing has come after it."""
+        return self._last
+
+    @property
     def last_station(self) -> int | None:
         """Whom the newest command asked, while nothing has come after it."""
         return self._last.command.address if self._last is not None else None

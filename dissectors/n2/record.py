@@ -47,11 +47,12 @@ class Damages:
     frames: int = 0
     octets: int = 0
     _settled: Tally = field(default_factory=Tally)
-    _flaws: dict[Flaw, Tally] = field(default_factory=dict)
-    _recent: list[tuple[int, int | None, Flaw | None]] = field(default_factory=list)
+    _flaws: dict[Flaw | int, Tally] = field(default_factory=dict)
+    _recent: list[tuple[int, int | None, Flaw | int | None]] = field(default_factory=list)
 
-    def add_bad(self, time: int, frame: int | None, flaw: Flaw | None = None) -> None:
-        """Count one; `flaw`: the one thing that is wrong with it, where that is known."""
+    def add_bad(self, time: int, frame: int | None, flaw: Flaw | int | None = None) -> None:
+        """Count one; `flaw`: the one thing that is wrong with it, where that is known; a number: its checksum is too
+        large by that."""
         self._recent.append((time, frame, flaw))
         if len(self._recent) > _RECALLED:
             self.settle()
@@ -74,11 +75,11 @@ class Damages:
         return _with(self._settled, ((time, frame) for time, frame, _ in self._recent))
 
     @property
-    def flaws(self) -> dict[Flaw, Tally]:
+    def flaws(self) -> dict[Flaw | int, Tally]:
         """Those whose one flaw is known, by it."""
         flaws = dict(self._flaws)
         for flaw in {flaw for _, _, flaw in self._recent if flaw is not None}:
-            recent = ((time, frame) for time, frame, its in self._recent if its is flaw)
+            recent = ((time, frame) for time, frame, its in self._recent if its == flaw)
             flaws[flaw] = _with(self._flaws.get(flaw, Tally()), recent)
         return flaws
 
@@ -115,6 +116,8 @@ class N2StationRecord:
     refused_while_reset: int = 0
     sent: Damages = field(default_factory=Damages)
     missing: Missing = field(default_factory=Missing)
+    behind: Tally = field(default_factory=Tally)  # damaged commands directly behind one to it that nothing followed
+    unheard: Missing = field(default_factory=Missing)  # the same, where the master had an answer
     resets: Tally = field(default_factory=Tally)
     slow: Tally = field(default_factory=Tally)
     again: Tally = field(default_factory=Tally)

@@ -49,7 +49,7 @@ RULES: dict[str, Rule] = {
             "most two a minute, is only noted: Johnson Controls calls up to two a minute tolerable.",
             "noise, wrong termination or bias, or two that talk at once",
             "if one station only: its stub, its connector; if all: termination, bias, ground",
-            explains=("N2005",),
+            explains=("N2005", "LN101", "LN103", "LN204"),
         ),
         Rule(
             "N2005",
@@ -57,9 +57,11 @@ RULES: dict[str, Rule] = {
             "no answer",
             "Commands that no answer followed, not even a late one. An error where the master turned to a station "
             "several times, or over 11 times at once, and got none. A single turn is only noted, or fewer than 1 in "
-            "100 and at most two a minute; and so are many addresses that are only asked who they are: a scan.",
-            "station off, wrong address or wrong baud rate, or a broken wire",
-            "check its supply, address and wiring; take it out of the master's list when it is gone",
+            "100 and at most two a minute; and so are many addresses that are only asked who they are: a scan. Where "
+            "several are asked and nobody but the master is heard, one finding names the bus.",
+            "station off, wrong address or wrong baud rate, or a broken wire; all of them: one between them and here",
+            "check its supply, address and wiring, and whether the master has its values: then only this tap does not "
+            "hear it",
         ),
         Rule(
             "N2006",
@@ -79,14 +81,14 @@ RULES: dict[str, Rule] = {
             "master does that. At least two such.",
             "two masters on one bus, or a commissioning tool beside the controller",
             "find the second master and take it off",
-            explains=("N2004", "N2005", "N2008", "N2010", "N2011", "N2013", "N2014", "LN1", "LN2"),
+            explains=("N2004", "N2005", "N2008", "N2010", "N2011", "N2013", "N2014", "N2015", "LN1", "LN2"),
         ),
         Rule(
             "N2008",
             Severity.ERROR,
             "answered twice",
-            "A second, different good answer came to one command that was sent once. A single time it is only noted: a "
-            "command may not have been heard here.",
+            "A second, different good answer came to one command that was sent once, sooner than a command that was "
+            "missed at this tap would let one come. A single time it is only noted.",
             "two stations have the same address",
             "switch the station off and see whether something still answers",
             explains=("N2004", "N2011", "N2013", "N2014", "LN101", "LN103", "LN2"),
@@ -114,14 +116,15 @@ RULES: dict[str, Rule] = {
             "Answers without a command before them, or after the master had gone on.",
             "a master that is not heard at this place of the bus, or a station far slower than the master's timeout",
             "compare the answer times with the master's timeout; move the tap",
-            explains=("N2005", "N2003", "LN1", "LN2"),
+            explains=("N2005", "N2003", "N2015", "LN1", "LN2"),
         ),
         Rule(
             "N2012",
             Severity.ERROR,
             "damaged always in the same way",
             "At least three damaged frames of one sender, and 4 in 5 of all its damaged ones, are right but for one "
-            "and the same thing: the first or the last octet missing or spoilt, or the two checksum digits swapped. "
+            "and the same thing: the first or the last octet missing or spoilt, the two checksum digits swapped, or "
+            "(six at least) the checksum wrong by one and the same number. "
             "What they were follows from the checksum and from what was asked, and is shown, marked as repaired. Where "
             "all stations have it, or the only one that is heard lacks its first or last octet, one finding names "
             "the bus. A warning where fewer than half of its frames have it.",
@@ -145,11 +148,25 @@ RULES: dict[str, Rule] = {
             Severity.WARNING,
             "answers into what comes next",
             "Damage that stands while the answer of one station is overdue, at least three times, and far more often "
-            "then than in frames of the same senders elsewhere (chance under 1 in 500). An answer after the master's "
+            "then than in frames of the same senders elsewhere (chance under 1 in 500); or commands of which so many "
+            "are damaged directly behind one to it that nothing followed. An answer after the master's "
             "timeout falls on the next command or on the answer to it, and two senders at once are no frame.",
             "the station answers when its master has given up; those whose frames are hit are not to blame",
             "raise the message timeout of the master, or find out why this station is slow; nobody else's cable",
             explains=("N2003", "N2004", "N2005", "N2006", "N2011", "LN1", "LN2"),
+        ),
+        Rule(
+            "N2015",
+            Severity.WARNING,
+            "answers not heard here",
+            "Commands without an answer, behind which the master asks something else after one try, within three "
+            "quarters of the shortest time that it waited before it repeated one (of 250 ms, the least that an NAE can "
+            "be given, where it repeated none). So it had an answer. Asking who is there does not count. A single one, "
+            "or fewer than 1 in 100 and at most two a minute, is only noted.",
+            "a tap that does not hear what the master does: behind a repeater, on one pair of a four-wire line, loose; "
+            "no station is to blame",
+            "move the tap towards the stations that are not heard; where none is, listen on the other pair",
+            explains=("N2005",),
         ),
     )
 }

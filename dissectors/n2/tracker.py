@@ -6,11 +6,14 @@
 2. A damaged answer leaves the command open: it may have been junk, and a good one come yet. So damage alone is never a
    second answer.
 3. A command closes the one before it: no response, or a damaged answer where one came, or octets that may be one.
-4. The same octets again, at once, are an echo; within GIVE_UP of the unanswered try, with no other command between,
-   a retry.
+4. The same octets again, at once, are an echo; so they are where the commands before came twice as far apart, sooner
+   than any master repeats, and were answered then (`relay.py`). Within GIVE_UP of the unanswered try, with no other
+   command between, they are a retry.
 5. A second good answer without a command between: late where a command a short while ago is owed one of that form (of
    the two answers either may be the late one), or was damaged or had a damaged answer, else answered twice. Whether
-   that means two stations is for the rules to say: the same octets again may be a repeater's.
+   that means two stations is for the rules to say: the same octets again may be a repeater's. Where there is room for
+   a command that was missed at this tap, it answers that one, unasked; a station that has answered four later commands
+   owes nothing any more.
 6. How long a master waits is its own setting (NAE 250 ms to 3 s), so silence alone closes a command after GIVE_UP.
 7. A damaged command is for the station that it names where that one is known; else for the one known station whose
    address makes its checksum right, and is most like what was sent.
@@ -25,9 +28,11 @@ from dataclasses import dataclass, replace
 from dissectors.frame import Event, Frame, Header, Noise, Reason, Role
 from dissectors.line import NS_PER_S, Timing
 from dissectors.n2.commands import parse_command
-from dissectors.n2.forms import fits, may_answer
+from dissectors.n2.exchange import Exchange, best_owed, closed_exchange
+from dissectors.n2.forms import may_answer
 from dissectors.n2.header import BROADCAST, meant
 from dissectors.n2.known import KnownStations
+from dissectors.n2.relay import Relay
 from dissectors.n2.stretch import STRAY
 from dissectors.tracker import Interval, Placement, Tracked, Transaction, Verdict
 
@@ -38,39 +43,10 @@ GIVE_UP = 3 * NS_PER_S
 """Longest time that a master waits for an answer, ns (upper end of the NAE's setting; digimat.n2's default)."""
 
 _LONGEST = 256  # characters of an answer that may have begun in time and not be read yet
+_SHORTEST = 7  # characters of a command
 _OWING = 16  # commands remembered that a late answer may still answer
 FEW = 16
 """Answers of a station after which its shortest time says something."""
-
-
-@dataclass(slots=True)
-class _Exchange:
-    """A command and what became of it."""
-
-    id: int
-    no: int
-    octets: bytes
-    station: int | None
-    kind: str
-    start: int
-    end: int
-    slack: int
-    attempt: int
-    of: int | None
-    damaged: bool
-    spoilt: bool = False  # octets came that may have been an answer
-    bad: Transaction | None = None  # how it ends if the damaged answer that came was all
-    answer: bytes = b""
-    answer_end: int = 0
-
-    @property
-    def is_owed(self) -> bool:
-        """Whether it is known what was asked, and nothing came that may have been the answer."""
-        return not self.damaged and not self.spoilt and self.bad is None
-
-    @property
-    def first_try(self) -> int:
-        return self.id if self.of is None else self.of
 
 
 @dataclass(slots=True)
@@ -93,12 +69,14 @@ class N2Tracker:
         self._char = timing.char
         self._at_once = max(timing.t35, timing.char + timing.latency)
         self._next = 1
-        self._open: _Exchange | None = None
-        self._missed: _Exchange | None = None  # the last command, closed without a good answer
-        self._owing: deque[_Exchange] = deque(maxlen=_OWING)  # commands without a good answer, oldest first
-        self._done: _Exchange | None = None  # the last command, when it was closed by an answer
+        self._open: Exchange | None = None
+        self._missed: Exchange | None = None  # the last command, closed without a good answer
+        self._owing: deque[Exchange] = deque(maxlen=_OWING)  # commands without a good answer, oldest first
+        self._done: Exchange | None = None  # the last command, when it was closed by an answer
         self._known = KnownStations()
         self._times: dict[int, _Times] = {}  # by station
+        self._pause: int | None = None  # ns, the shortest between an answer and the next command
+        self._relay = Relay(max(timing.t35, 2 * timing.char + timing.latency))
 
     def track(self, no: int, event: Event, header: Header | None) -> Tracked:
         """Take the next event; `header` is None exactly for noise."""
@@ -125,7 +103,7 @@ class N2Tracker:
         if self._open is None:
             return ()
         left, self._open = self._open, None
-        return (left.bad or _transaction(left, Verdict.OPEN),)
+        return (left.bad or closed_exchange(left, Verdict.OPEN),)
 
     # --- exchanges that go by without it (`block_pairing.py`) ---
 
@@ -144,18 +122,31 @@ class N2Tracker:
         times = self._times.get(station)
         return (0, 0) if times is None else (times.count, times.least)
 
-    def pass_by(self, count: int, times: Mapping[int, tuple[int, int]], asked: Row, answered: Frame) -> None:
+    def pass_by(
+        self,
+        count: int,
+        times: Mapping[int, tuple[int, int]],
+        first: int,
+        pause: int | None,
+        asked: Row,
+        answered: Frame,
+    ) -> None:
         """Take `count` answered exchanges that followed one another.
 
-        `times`: by station, in the order of first being asked: as `known_times` gives them behind. `asked`: the last
-        command, `answered` its answer.
+        `times`: by station, in the order of first being asked: as `known_times` gives them behind. `first`: ns, begin
+        of the first command; `pause`: the shortest between two of the exchanges. `asked`: the last command, `answered`
+        its answer.
         """
+        self._see_pause(first)
+        if pause is not None:
+            self._pause = pause if self._pause is None else min(self._pause, pause)
+        self._relay.forget()
         for station, (number, least) in times.items():
             self._known.add(station)
             self._times[station] = _Times(number, least)
         self._next += count
         no, frame, header = asked
-        self._done = _Exchange(
+        self._done = Exchange(
             id=self._next - 1,
             no=no,
             octets=frame.octets,
@@ -175,8 +166,12 @@ class N2Tracker:
 
     def _command(self, no: int, frame: Frame, header: Header, closed: list[Transaction]) -> Placement:
         open_, octets = self._open, meant(frame)
-        if open_ is not None and octets == open_.octets and frame.start - open_.end <= self._at_once:
-            return self._echo(no, frame, header.role, open_, closed)
+        if open_ is not None and octets == open_.octets:
+            again = frame.start - open_.end
+            if again <= self._at_once or (not open_.echoed and self._relay.repeats_after(again)):
+                open_.echoed = True
+                return self._echo(no, frame, header.role, open_, closed)
+        self._see_pause(frame.start)
         if open_ is not None:
             closed.append(self._close_unanswered(open_))
         station = header.destination if header.ok or frame.repair is not None else self._station_of(octets, header)
@@ -184,9 +179,10 @@ class N2Tracker:
             self._known.add(station)
         missed = self._missed
         attempt, of = 1, None
+        gap: int | None = None
         if missed is not None and missed.octets == octets and frame.start - missed.end <= GIVE_UP:
-            attempt, of = missed.attempt + 1, missed.first_try
-        self._open = _Exchange(
+            attempt, of, gap = missed.attempt + 1, missed.first_try, frame.start - missed.end
+        self._open = Exchange(
             id=self._take_id(),
             no=no,
             octets=octets,
@@ -198,9 +194,16 @@ class N2Tracker:
             attempt=attempt,
             of=of,
             damaged=not header.ok,
+            gap=gap,
         )
         self._done = None
         return Placement(no, self._open.id, header.role, None, station)
+
+    def _see_pause(self, start: int) -> None:
+        """A command begins: how long the master paused after the answer before, where that was the last thing heard."""
+        if self._done is not None:
+            pause = max(0, start - self._done.answer_end)
+            self._pause = pause if self._pause is None else min(self._pause, pause)
 
     def _station_of(self, octets: bytes, header: Header) -> int | None:
         """Whom a damaged command is for (rule 7)."""
@@ -209,19 +212,20 @@ class N2Tracker:
             return named
         return self._known.most_like(octets)
 
-    def _close_unanswered(self, exchange: _Exchange) -> Transaction:
+    def _close_unanswered(self, exchange: Exchange) -> Transaction:
         self._open, self._missed, self._done = None, exchange, None
         if exchange.station != BROADCAST:
+            exchange.known_answers = self._answers_of(exchange)
             self._owing.append(exchange)
         if exchange.bad is not None:
             return exchange.bad
         if exchange.spoilt:
-            return _transaction(exchange, Verdict.DAMAGED_ANSWER, error="octets that are no frame")
+            return closed_exchange(exchange, Verdict.DAMAGED_ANSWER, error="octets that are no frame")
         if exchange.damaged:
-            return _transaction(exchange, Verdict.DAMAGED_REQUEST)
+            return closed_exchange(exchange, Verdict.DAMAGED_REQUEST)
         if exchange.station == BROADCAST:
-            return _transaction(exchange, Verdict.BROADCAST)
-        return _transaction(exchange, Verdict.NO_RESPONSE)
+            return closed_exchange(exchange, Verdict.BROADCAST)
+        return closed_exchange(exchange, Verdict.NO_RESPONSE)
 
     def _hear_noise(self, event: Event) -> None:
         """A few stray octets are nobody's answer; more, or what ends like one, may be."""
@@ -239,28 +243,32 @@ class N2Tracker:
         if open_ is None:
             return self._orphan(no, frame, header, closed)
         if not header.ok:
-            bad = _transaction(open_, Verdict.DAMAGED_ANSWER, error=header.error)
+            bad = closed_exchange(open_, Verdict.DAMAGED_ANSWER, error=header.error)
             open_.bad = replace(bad, response=no, end=frame.end, latency=self._since(open_, frame))
             return Placement(no, open_.id, Role.RESPONSE, open_.station, None)
         owing = self._owed_rather(open_, frame)
         if owing is not None:
             self._forget(owing)
             return self._separate(no, frame, header, Verdict.LATE, owing, closed)
+        missed = self._missed
+        perhaps_late = missed is not None and missed.is_owed and missed.station != open_.station
         self._open, self._missed, self._done = None, None, open_
         open_.answer, open_.answer_end = frame.octets, frame.end
+        if not open_.echoed:
+            self._relay.see_answered(open_.attempt, open_.gap)
         latency = self._since(open_, frame)
         verdict = Verdict.ANSWERED if open_.attempt == 1 else Verdict.RETRY
         if open_.damaged:
             verdict = Verdict.DAMAGED_REQUEST
         if header.kind == "negative-acknowledge":
             verdict = Verdict.EXCEPTION
-        if open_.station is not None and open_.station in self._known:
+        if open_.station is not None and open_.station in self._known and not perhaps_late:
             self._times.setdefault(open_.station, _Times()).add(latency)
-        done = _transaction(open_, verdict, error=header.error)
+        done = closed_exchange(open_, verdict, error=header.error)
         closed.append(replace(done, response=no, end=frame.end, latency=latency))
         return Placement(no, open_.id, Role.RESPONSE, open_.station, None)
 
-    def _owed_rather(self, open_: _Exchange, frame: Frame) -> _Exchange | None:
+    def _owed_rather(self, open_: Exchange, frame: Frame) -> Exchange | None:
         """An earlier command, to another station or of another form, that a good answer rather answers (rule 1)."""
         asked = parse_command(open_.octets)
         formless = not open_.damaged and not may_answer(asked, frame.octets)
@@ -272,13 +280,29 @@ class N2Tracker:
         candidates = [e for e in self._within(frame.start) if e.is_owed and (e.octets != open_.octets or not formless)]
         if self._missed is not None and self._missed not in candidates and self._missed.bad is None:
             candidates.append(self._missed)
-        return _best_owed(candidates, frame)
+        return best_owed(candidates, frame)
 
-    def _within(self, now: int) -> list[_Exchange]:
-        """Commands that had no good answer and may still get one."""
-        return [exchange for exchange in self._owing if now - exchange.end <= 2 * GIVE_UP]
+    def _within(self, now: int) -> list[Exchange]:
+        """Commands that had no good answer and may still get one: a station answers in order."""
+        return [
+            exchange
+            for exchange in self._owing
+            if now - exchange.end <= 2 * GIVE_UP and self._answers_of(exchange) - exchange.known_answers <= 3
+        ]
 
-    def _forget(self, exchange: _Exchange) -> None:
+    def _answers_of(self, exchange: Exchange) -> int:
+        """How many answers of its station came so far."""
+        return 0 if exchange.station is None else self.known_times(exchange.station)[0]
+
+    def _has_room(self, done: Exchange, frame: Frame) -> bool:
+        """Whether a command that was missed at this tap fits between the last answer and this one."""
+        if self._pause is None:
+            return False
+        room = max(0, self._pause - self._latency) + _SHORTEST * self._char
+        soonest = 0 if done.station is None else self.known_times(done.station)[1]
+        return frame.start - done.answer_end >= room + soonest // 2
+
+    def _forget(self, exchange: Exchange) -> None:
         if self._missed is exchange:
             self._missed = None
         self._owing = deque((other for other in self._owing if other is not exchange), _OWING)
@@ -289,10 +313,12 @@ class N2Tracker:
         if not header.ok:
             station = done.station if done is not None else missed.station if missed is not None else None
             return self._separate(no, frame, header, Verdict.UNSOLICITED, None, closed, station)
+        if done is not None and self._has_room(done, frame):
+            return self._separate(no, frame, header, Verdict.UNSOLICITED, None, closed)
         if done is not None:
             owed = self._within(frame.start)
             same = [exchange for exchange in owed if exchange.station == done.station]
-            owing = _best_owed(same, frame) or _best_owed(owed, frame) or self._crossed(owed, done, frame)
+            owing = best_owed(same, frame) or best_owed(owed, frame) or self._crossed(owed, done, frame)
             owing = owing or next((exchange for exchange in owed if not exchange.is_owed), None)
             if owing is not None:
                 self._forget(owing)
@@ -306,11 +332,11 @@ class N2Tracker:
             return self._separate(no, frame, header, Verdict.LATE, missed, closed)
         return self._separate(no, frame, header, Verdict.UNSOLICITED, None, closed)
 
-    def _crossed(self, owed: list[_Exchange], done: _Exchange, frame: Frame) -> _Exchange | None:
+    def _crossed(self, owed: list[Exchange], done: Exchange, frame: Frame) -> Exchange | None:
         """A command that the answer before this one rather answered, if this one may answer the last command."""
         if not may_answer(parse_command(done.octets), frame.octets):
             return None
-        return _best_owed(owed, replace(frame, octets=done.answer))
+        return best_owed(owed, replace(frame, octets=done.answer))
 
     def _separate(
         self,
@@ -318,7 +344,7 @@ class N2Tracker:
         frame: Frame,
         header: Header,
         verdict: Verdict,
-        to: _Exchange | None,
+        to: Exchange | None,
         closed: list[Transaction],
         station: int | None = None,
     ) -> Placement:
@@ -340,7 +366,7 @@ class N2Tracker:
         closed.append(transaction)
         return Placement(no, transaction.id, Role.RESPONSE, station, None)
 
-    def _echo(self, no: int, frame: Frame, role: Role, of: _Exchange, closed: list[Transaction]) -> Placement:
+    def _echo(self, no: int, frame: Frame, role: Role, of: Exchange, closed: list[Transaction]) -> Placement:
         request, response = (None, no) if role is Role.RESPONSE else (no, None)
         source, destination = (of.station, None) if role is Role.RESPONSE else (None, of.station)
         echo = Transaction(
@@ -357,7 +383,7 @@ class N2Tracker:
         closed.append(echo)
         return Placement(no, echo.id, role, source, destination)
 
-    def _since(self, exchange: _Exchange, frame: Frame) -> Interval:
+    def _since(self, exchange: Exchange, frame: Frame) -> Interval:
         """Time from the end of a command to the begin of an answer."""
         nominal = frame.start - exchange.end
         return Interval(nominal, max(0, nominal - self._latency), max(0, nominal + exchange.slack))
@@ -365,26 +391,3 @@ class N2Tracker:
     def _take_id(self) -> int:
         self._next += 1
         return self._next - 1
-
-
-def _best_owed(exchanges: list[_Exchange], frame: Frame) -> _Exchange | None:
-    """The command that an answer belongs to: the oldest whose form it surely has, else the oldest it may answer."""
-    able = [e for e in exchanges if e.is_owed and may_answer(parse_command(e.octets), frame.octets)]
-    sure = [e for e in able if fits(parse_command(e.octets), frame.octets)]
-    return next(iter(sure or able), None)
-
-
-def _transaction(exchange: _Exchange, verdict: Verdict, error: str | None = None) -> Transaction:
-    return Transaction(
-        id=exchange.id,
-        station=exchange.station,
-        kind=exchange.kind,
-        request=exchange.no,
-        response=None,
-        verdict=verdict,
-        start=exchange.start,
-        end=exchange.end,
-        attempt=exchange.attempt,
-        of=exchange.of,
-        error=error,
-    )

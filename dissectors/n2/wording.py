@@ -8,21 +8,25 @@ from dataclasses import dataclass, replace
 from dissectors.findings import Finding, Severity, Tally, counted, times
 from dissectors.frame import Flaw
 from dissectors.line import MS, NS_PER_S
-from dissectors.n2.blame import blamed
+from dissectors.n2.blame import blamed, together
 from dissectors.n2.commands import error_name
 from dissectors.n2.objects import attribute_name, number, object_name
 from dissectors.n2.record import Damages, N2StationRecord
 from dissectors.n2.rules import RULES
+from dissectors.n2.unheard import SOON
 from dissectors.strikes import Strikes
 
-SLOW = 250 * MS
-"""Shortest message timeout that an NAE can be given, ns (JCI help, N2 trunk)."""
+SLOW = SOON
+"""Answers after which an NAE with the shortest timeout would have given up, ns."""
 
 OVERRIDE_AGE = 600 * NS_PER_S
 """After 10 minutes an override should have been renewed or released; the F510's do not expire (its manual, 1.2.2)."""
 
 ALIKE = 3
 """So many frames of one sender damaged in the same way are no chance, where 4 in 5 of its damaged ones are."""
+
+ALIKE_OFF = 6
+"""The same of checksums that are wrong by one and the same number: single bits are often wrong by the same."""
 
 TRIES = 11
 """Most commands of one turn to a station: a first one and the most retries that an NAE can be given (3 to 10)."""
@@ -67,8 +71,13 @@ def worded(heard: N2Evidence) -> Iterator[Finding]:
     yield from _damaged(heard)
     scanned = _scanned(heard)
     yield from _scan(heard, scanned)
+    yield from _unheard(heard)
+    silent = _silent(heard, scanned)
+    if silent:
+        yield _nobody(heard, silent)
+    told = scanned | silent | _only_unheard(heard)
     for address in sorted(heard.stations):
-        yield from _of_station(heard, f"station {address}", heard.stations[address], address in scanned)
+        yield from _of_station(heard, f"station {address}", heard.stations[address], address in told)
 
 
 # --- damage ---
@@ -124,22 +133,23 @@ def _alike(heard: N2Evidence) -> Iterator[Finding]:
         yield tally.found(RULES["N2012"], name, seen, severity)
 
 
-def _flaw(sent: Damages) -> Flaw | None:
+def _flaw(sent: Damages) -> Flaw | int | None:
     """The flaw that nearly all damaged frames of a sender have."""
     for flaw, tally in sent.flaws.items():
-        if tally.count >= ALIKE and 5 * tally.count >= 4 * sent.bad.count:
+        least = ALIKE if isinstance(flaw, Flaw) else ALIKE_OFF
+        if tally.count >= least and 5 * tally.count >= 4 * sent.bad.count:
             return flaw
     return None
 
 
-def _only_flaw(sent: Damages) -> Flaw | None:
+def _only_flaw(sent: Damages) -> Flaw | int | None:
     """The flaw that all frames of a sender of few have."""
     flaws = [flaw for flaw, tally in sent.flaws.items() if tally.count == sent.frames]
     return flaws[0] if len(flaws) == 1 else None
 
 
-def _flaw_words(flaw: Flaw) -> str:
-    return f"always the same: {flaw.value}"
+def _flaw_words(flaw: Flaw | int) -> str:
+    return f"always the same: {flaw.value if isinstance(flaw, Flaw) else f'checksum {flaw:02X}h too large'}"
 
 
 # --- who is not there ---
@@ -164,6 +174,44 @@ def _scan(heard: N2Evidence, scanned: frozenset[int]) -> Iterator[Finding]:
     yield tally.found(RULES["N2005"], "master", seen, Severity.NOTE)
 
 
+def _only_unheard(heard: N2Evidence) -> frozenset[int]:
+    """Stations that are there, and of which this tap hears nothing."""
+    return frozenset(
+        address for address, one in heard.stations.items() if not one.answered and one.unheard.count > one.missing.count
+    )
+
+
+def _unheard(heard: N2Evidence) -> Iterator[Finding]:
+    """Answers that the master had, and this tap did not hear."""
+    missed = {address: one.unheard.tally() for address, one in heard.stations.items() if one.unheard.count}
+    if not missed:
+        return
+    tally, asked = together(missed.values()), sum(heard.stations[address].asked for address in missed)
+    whose = ", ".join(map(str, sorted(missed)[:MANY_POINTS])) + (" and more" if len(missed) > MANY_POINTS else "")
+    seen = f"{tally.count} of {asked} answers (of {'station' if len(missed) == 1 else 'stations'} {whose}) were not "
+    seen += "heard: the master went on to another command, sooner than it gives up"
+    yield heard.noted_if(heard.is_rare(tally, asked), tally.found(RULES["N2015"], "bus", seen))
+
+
+def _silent(heard: N2Evidence, scanned: frozenset[int]) -> frozenset[int]:
+    """All stations that were asked, where they are several and none was heard at all."""
+    asked = {address: one for address, one in heard.stations.items() if one.asked and address not in scanned}
+    if len(asked) < 2 or heard.stray.count:
+        return frozenset()
+    if any(one.answered or one.late.count or one.sent.bad.count for one in heard.stations.values()):
+        return frozenset()
+    return frozenset(address for address, one in asked.items() if one.missing.count > one.unheard.count)
+
+
+def _nobody(heard: N2Evidence, silent: frozenset[int]) -> Finding:
+    """No station is heard: one thing that is wrong, at this place of the bus or behind the master."""
+    each = [_missing(heard, "", heard.stations[address]) for address in sorted(silent)]
+    tally = together([heard.stations[address].missing.tally() for address in silent])
+    asked = sum(heard.stations[address].asked for address in silent)
+    seen = f"no answer to any of {asked} commands to {len(silent)} stations: only the master is heard"
+    return tally.found(RULES["N2005"], "bus", seen, max(one.severity for one in each))
+
+
 def _missing(heard: N2Evidence, name: str, station: N2StationRecord) -> Finding:
     tally, rule = station.missing.tally(), RULES["N2005"]
     if not station.answered and not station.late.count:
@@ -178,14 +226,14 @@ def _missing(heard: N2Evidence, name: str, station: N2StationRecord) -> Finding:
 # --- stations ---
 
 
-def _of_station(heard: N2Evidence, name: str, station: N2StationRecord, scanned: bool) -> Iterable[Finding]:
+def _of_station(heard: N2Evidence, name: str, station: N2StationRecord, is_told: bool) -> Iterable[Finding]:
     if station.resets.count:
         seen = f"answered N00 {times(station.refused_while_reset)}: {times(station.resets.count)} reset"
         yield station.resets.found(RULES["N2001"], name, seen)
     yield from _points(name, station)
     if station.slow.count:
         yield _slow(heard, name, station)
-    if station.missing.count and not scanned:
+    if station.missing.count and not is_told:
         yield _missing(heard, name, station)
     yield from _overrides(heard, name, station)
     yield from _again(heard, name, station)
@@ -202,14 +250,12 @@ MANY_POINTS = 4
 
 def _points(name: str, station: N2StationRecord) -> Iterator[Finding]:
     if len(station.points) >= MANY_POINTS:
-        tallies = list(station.points.values())
-        together = Tally(sum(one.count for one in tallies), min(one.first for one in tallies))
-        together.last = max(one.last for one in tallies)
-        together.evidence = sorted({no for one in tallies for no in one.evidence})[:MANY_POINTS]
+        whole = together(station.points.values())
+        whole.evidence = whole.evidence[:MANY_POINTS]
         names = sorted({object_name(region, point) for region, point, _ in station.points})
         more = f" and {len(names) - MANY_POINTS} more" if len(names) > MANY_POINTS else ""
-        seen = f"{', '.join(names[:MANY_POINTS])}{more}: N11 {times(together.count)}"
-        yield together.found(RULES["N2002"], name, seen)
+        seen = f"{', '.join(names[:MANY_POINTS])}{more}: N11 {times(whole.count)}"
+        yield whole.found(RULES["N2002"], name, seen)
         return
     for (region, point, attribute), tally in sorted(station.points.items(), key=lambda item: str(item[0])):
         what = object_name(region, point)

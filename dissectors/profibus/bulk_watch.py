@@ -46,7 +46,7 @@ class BulkBusWatch(BusWatch):
 
     def is_calm(self, rows: RowColumns, units: Units, begin: int) -> bool:
         """Whether nothing is known that makes more of regular units from `begin` on than they say themselves."""
-        if self._asked is not None or self._robbed is not None:
+        if self._asked is not None or self._robbed is not None or self._interruption is not None:
             return False
         if self._holder not in (None, int(units.source[begin])):
             return False
@@ -54,7 +54,7 @@ class BulkBusWatch(BusWatch):
             return False
         if units.token[begin]:
             return self._token is None
-        return not self._newest or self._newest != _octets(rows, int(units.request[begin]))
+        return not self._newest or self._newest != octets_of(rows, int(units.request[begin]))
 
     def pass_by(self, rows: RowColumns, units: Units, begin: int, end: int) -> None:
         """Stand behind regular units [begin, end), the last of which is answered."""
@@ -69,7 +69,7 @@ class BulkBusWatch(BusWatch):
         self._count(units, which)
         self._pass_tokens(rows, units, which)
         self._exchange(rows, units, which)
-        self._token, self._newest = None, _octets(rows, int(request[-1]))
+        self._token, self._newest = None, octets_of(rows, int(request[-1]))
 
     def _count(self, units: Units, which: slice) -> None:
         """Tokens, requests and polls of each master."""
@@ -184,6 +184,7 @@ def _trailing(urgent: Masks, before: int) -> int:
     return len(urgent) - 1 - int(calm[-1]) if len(calm) else before + len(urgent)
 
 
-def _octets(rows: RowColumns, place: int) -> bytes:
+def octets_of(rows: RowColumns, place: int) -> bytes:
+    """The octets of a row."""
     begin = int(rows.frames.offset[place])
     return rows.octets[begin : begin + int(rows.frames.length[place])].tobytes()

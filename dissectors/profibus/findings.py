@@ -58,6 +58,8 @@ class ProfibusFindings:
                 self._damaged.add(event.start, no)
             elif header is not None:
                 self._count(header)
+                if header.role is Role.REQUEST and header.destination is not None:
+                    self.records[header.destination].ask(no, event.octets)
         self.watch.see(no, event, header)
 
     def count_rows(self, frames: int, passed: Mapping[int, int], told: Mapping[int, int]) -> None:
@@ -136,11 +138,13 @@ class ProfibusFindings:
     def _of_exchanges(self, who: Subject, record: RequestsRecord) -> Iterator[Finding]:
         silent, total = record.unanswered, record.requests
         if silent.count and not record.answers and silent.count >= _LEAST:
-            grave = Severity.ERROR if record.fresh >= _LEAST_FRESH else Severity.NOTE
-            yield silent.found(RULES["PB001"], who, f"no answer to any of {counted(total, 'request')}", grave)
+            grave = Severity.ERROR if record.fresh >= _LEAST_FRESH and record.silent > record.unheard else Severity.NOTE
+            seen = f"no answer to any of {counted(total, 'request')}{_unheard_seen(record)}"
+            yield silent.found(RULES["PB001"], who, seen, grave)
         elif silent.count and record.answers:
-            grave = _grave(silent.count, total)
-            yield silent.found(RULES["PB002"], who, f"{silent.count} of {total} requests without answer", grave)
+            grave = _grave(record.silent, total)
+            seen = f"{silent.count} of {total} requests without answer{_unheard_seen(record)}"
+            yield silent.found(RULES["PB002"], who, seen, grave)
         if record.twice.count:
             often = record.twice.count >= _LEAST and record.twice.count >= _SHARE * total
             grave = Severity.ERROR if often else Severity.NOTE
@@ -256,8 +260,13 @@ class ProfibusFindings:
                 seen = f"station {address} made a token of its own {times(tally.count)}"
                 yield tally.found(RULES["PB013"], BUS, seen + self._woken_seen())
             elif what is Notice.TOKEN_AGAIN:
-                seen = f"the token to it was sent again {times(tally.count)}"
-                yield tally.found(RULES["PB014"], station(address), seen, _grave(tally.count, self._passed[address]))
+                seen, grave = (
+                    f"the token to it was sent again {times(tally.count)}",
+                    _grave(tally.count, self._passed[address]),
+                )
+                if not self._told[address]:
+                    seen, grave = f"{seen}; nothing that it sends was heard by this tap", Severity.NOTE
+                yield tally.found(RULES["PB014"], station(address), seen, grave)
             elif what is Notice.OUT_OF_TURN and tally.count >= _LEAST:
                 seen = f"station {address} sent {times(tally.count)} while another master held the token"
                 often = tally.count >= _SHARE * self._told[address]
@@ -288,6 +297,12 @@ class ProfibusFindings:
 def _grave(count: int, total: int) -> Severity:
     """How grave it is that `count` of `total` are wrong: noted below one in a hundred."""
     return Severity.WARNING if count >= _LEAST and count >= _SHARE * total else Severity.NOTE
+
+
+def _unheard_seen(record: RequestsRecord) -> str:
+    if not record.unheard:
+        return ""
+    return f"; after {record.unheard} of them the master counts on: it had an answer that this tap did not hear"
 
 
 def _watchdog(slave: SlaveView) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from dissectors import stretches
 from dissectors.columns import NONE, VERDICTS
-from dissectors.profibus.bulk_watch import BulkBusWatch, grouped
+from dissectors.profibus.bulk_watch import BulkBusWatch, grouped, octets_of
 from dissectors.profibus.findings import ProfibusFindings
 from dissectors.profibus.regular_columns import Units
 from dissectors.row_columns import in_turn
@@ -76,6 +76,9 @@ class _Judging:
             record.exchanged += len(mine)
             record.answers += len(mine)
             record.before = Verdict.ANSWERED
+            told = mine[-2:] if record.is_clear else np.append(mine[:1], mine[1:][-2:])
+            for place in units.request[told].tolist():
+                record.ask(self._rows.first + place, octets_of(self._rows, place))
             for at in mine[least > limit].tolist():
                 rows = (int(closed.request[at]), int(closed.response[at]))
                 record.is_slow(int(closed.least[at]), int(closed.start[at]), *rows)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from dissectors.findings import EVIDENCE_MAX, Tally
 from dissectors.profibus.services import Service
+from dissectors.profibus.telegram import parse
 from dissectors.tracker import Transaction, Verdict
 
 _EXCHANGE = Service.DATA_EXCHANGE.value
@@ -20,7 +21,8 @@ class RequestsRecord:
 
     `repeats`: of all kinds; `worst`: in a row, at most. `repeated`: those of requests that were answered well here.
     `before`: how the newest ended. `fresh`: requests without answer that are no repeats at once. `exchanged`,
-    `put_off`: requests for data exchange, and refused ones of them.
+    `put_off`: requests for data exchange, and refused ones of them. `unheard`: requests without answer after which the
+    master went on as after one: it changed the frame count bit, which it does for no other reason.
     """
 
     requests: int = 0
@@ -39,6 +41,27 @@ class RequestsRecord:
     fresh: int = 0
     exchanged: int = 0
     put_off: int = 0
+    unheard: int = 0
+    _newest: tuple[int, bytes] | None = None  # the newest request: its row and octets
+    _previous: tuple[int, bytes] | None = None
+    _silent: tuple[int, bytes] | None = None  # the newest request, where it is known that no answer was heard
+
+    def ask(self, no: int, octets: bytes) -> None:
+        """A request is sent."""
+        self._previous, self._newest = self._newest, (no, octets)
+        if self._silent is not None:
+            self.unheard += _counts_on(self._silent[1], octets)
+            self._silent = None
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether the next request tells nothing of the one before it."""
+        return self._silent is None
+
+    @property
+    def silent(self) -> int:
+        """Requests without answer that the master may not have had an answer to, either."""
+        return self.unanswered.count - self.unheard
 
     def settle(self, closed: Transaction, slow: int) -> None:
         """Take an exchange with it. `slow`: ns that an answer may take."""
@@ -60,6 +83,7 @@ class RequestsRecord:
         if verdict is Verdict.NO_RESPONSE:
             self.unanswered.add(closed.start, closed.request)
             self.fresh += closed.attempt == 1
+            self._miss(closed.request)
         elif verdict is Verdict.DAMAGED_ANSWER:
             self.damaged.add(closed.start, closed.request, closed.response)
         elif verdict is Verdict.EXCEPTION:
@@ -69,10 +93,26 @@ class RequestsRecord:
         if closed.latency is not None and closed.latency.low > slow and verdict is not Verdict.DAMAGED_ANSWER:
             self.is_slow(closed.latency.low, closed.start, closed.request, closed.response)
 
+    def _miss(self, no: int) -> None:
+        """No answer to the request in this row was heard; the next one may have been sent before that is known."""
+        previous, newest = self._previous, self._newest
+        if newest is not None and newest[0] == no:
+            self._silent = newest
+        elif newest is not None and previous is not None and previous[0] == no:
+            self.unheard += _counts_on(previous[1], newest[1])
+
     def is_slow(self, least: int, time: int, *rows: int | None) -> None:
         """Take an answer that came too late, after `least` ns."""
         self.slow.add(time, *rows)
         self.slowest = max(self.slowest, least)
+
+
+def _counts_on(before: bytes, after: bytes) -> bool:
+    """Whether the frame count bit of two requests says that the first one was answered."""
+    one, other = parse(before).control, parse(after).control
+    if one is None or other is None or not (one.fcv and other.fcv):
+        return False
+    return one.fcb is not other.fcb
 
 
 def joined(tallies: Sequence[Tally]) -> Tally:

@@ -14,17 +14,20 @@ RULES: dict[str, Rule] = {
             Severity.ERROR,
             "no answer",
             "A station is asked at least three times and never answers, with silence where the answer should be. Only "
-            "noted where that was one request and its repeats. Polls for stations (FDL status) do not count: nobody "
-            "need be there.",
+            "noted where that was one request and its repeats, or where the master counts on (frame count bit) as it "
+            "does after an answer: then it had one, and only this tap did not hear it. Polls for stations (FDL status) "
+            "do not count: nobody need be there.",
             "no station at this address: off, set to another address, cut off, or without the bus's rate",
-            "its supply, address switches, connector and terminators; if it is gone, take it out of the configuration",
+            "its supply, address switches, connector and terminators; if it is gone, take it out of the configuration; "
+            "where the master counts on, move the tap",
             explains=("PB003", "PB007"),
         ),
         Rule(
             "PB002",
             Severity.NOTE,
             "some requests without answer",
-            "A station answers, but not always. A warning from 3 and 1 in 100 requests on.",
+            "A station answers, but not always. A warning from 3 and 1 in 100 requests on; those do not count after "
+            "which the master counts on (frame count bit): it had the answer.",
             "a loose connector, a station that is reset or too busy, disturbances that only it hears",
             "connector, shield and terminators at this station; whether it happens at certain times",
             explains=("PB003", "PB007"),
@@ -143,7 +146,8 @@ RULES: dict[str, Rule] = {
             Severity.NOTE,
             "token sent again",
             "A token was sent once more because its taker did not show itself. A warning from 3 and 1 in 100 tokens "
-            "to it on.",
+            "to it on. Only noted where its taker was never heard: a ring does not keep one that is not there, so it "
+            "is this tap that does not hear it.",
             "a master that is slower than the slot time, disturbed, or gone",
             "slot time in both projects; connector and terminators at that master",
         ),
@@ -152,7 +156,9 @@ RULES: dict[str, Rule] = {
             Severity.ERROR,
             "speaks without the token",
             "A master sends requests while another one holds the token, at least three times, with nothing damaged "
-            "between token and request. Only noted where it is fewer than 1 in 100 of what that master sends.",
+            "between token and request, and the other one then goes on with the token, which had not come back to it: "
+            "else a token may have been missed at this tap. Only noted where it is fewer than 1 in 100 of what that "
+            "master sends.",
             "two masters that do not see each other, one with other bus parameters, or a master's address twice",
             "the bus parameters and addresses of all masters; take off the one that was added last",
             explains=("PB002", "PB003", "PB007", "PB008", "PB013", "PB014", *_LINE),

@@ -31,7 +31,7 @@ class Notice(Enum):
 
     CLAIM = auto()  # a master made a token of its own although a ring was running
     TOKEN_AGAIN = auto()  # a token was sent again: its taker did not show itself
-    OUT_OF_TURN = auto()  # a request by who did not hold the token
+    OUT_OF_TURN = auto()  # a request by who did not hold the token, whose holder then went on with it
     WOKE = auto()  # the same by who had it until it was given up for silent, and goes on as if nothing had been
     DROP = auto()  # a slave left data exchange by itself
     STARVED = auto()  # the same, where something else than the slave may be why
@@ -53,6 +53,17 @@ class Clear:
     def length(self) -> int:
         """For how long data was exchanged, ns."""
         return 0 if self.since is None else self.latest - self.since
+
+
+@dataclass(slots=True)
+class _Interruption:
+    """A master, `by`, spoke while `holder` had the token, in row `no`. `alone`: it passed a token to itself since."""
+
+    holder: int | None
+    by: int
+    no: int
+    time: int
+    alone: bool = False
 
 
 @dataclass(slots=True)
@@ -87,6 +98,7 @@ class BusWatch:
         self._heard = self._slack = 0  # end of the row before, and by how much it may have been earlier
         self._least_claim = timing.line.bits(_LEAST_CLAIM)
         self._holder: int | None = None
+        self._interruption: _Interruption | None = None  # until it is known whether a token was missed at this tap
         self._robbed: int | None = None  # who lost the token to another one that gave it up; until it speaks in turn
         self._newest = b""  # the newest request, while no token or other request came after it
         self._longest_clear: dict[int, int] = {}
@@ -164,6 +176,7 @@ class BusWatch:
             return
         self._unanswered(frame.start)
         self._newest = b""
+        self._goes_on(source)
         giver = self._master(source)
         is_again = self._token == (source, to) and source != to
         by_another = self._token is None or self._token[0] != source  # else its taker is gone, and it goes on alone
@@ -189,6 +202,10 @@ class BusWatch:
                 self._robbed = self._token[1]  # it did not take the token, which goes on without it
         else:
             self._robbed = self._holder
+        if self._interruption is not None and (source != to or self._interruption.alone):
+            self._interruption = None  # the token went round since
+        elif self._interruption is not None:
+            self._interruption.alone = True
         taker = self._master(to)
         if not is_again:
             if taker.got is not None:
@@ -197,9 +214,23 @@ class BusWatch:
         self._holder, self._token = to, (source, to)
 
     def _out_of_turn(self, source: int, no: int, frame: Frame) -> None:
-        """A master speaks that does not hold the token: as if nothing had been, where it slept when it lost it."""
-        self._tell(Notice.WOKE if source == self._robbed else Notice.OUT_OF_TURN, source, no, frame.start)
+        """A master speaks that does not hold the token: as if nothing had been, where it slept when it lost it.
+
+        Else it may have been given the token in a telegram that was missed at this tap: then who held it last is
+        silent until the token is back.
+        """
+        if source == self._robbed:
+            self._tell(Notice.WOKE, source, no, frame.start)
+        else:
+            self._interruption = _Interruption(self._holder, source, no, frame.start)
         self._holder = None
+
+    def _goes_on(self, source: int) -> None:
+        """A master speaks: had it never given the token away, who spoke meanwhile did not have it."""
+        cut = self._interruption
+        if cut is not None and cut.holder == source:
+            self._tell(Notice.OUT_OF_TURN, cut.by, cut.no, cut.time)
+            self._interruption = None
 
     def _is_at_once(self, frame: Frame) -> bool:
         """Whether it is sure that less silence was before a frame than any master waits before it claims the token."""
@@ -212,6 +243,7 @@ class BusWatch:
         assert to is not None
         service, master = service_of(asked), self._master(source)
         is_poll = service is Service.FDL_STATUS
+        self._goes_on(source)
         if self._holder is not None and self._holder != source:
             self._out_of_turn(source, no, frame)
         elif self._robbed == source and self._holder == source:

@@ -78,6 +78,15 @@ def _swapped(octets: bytes) -> bytes:
     return octets[:-3] + octets[-2:-1] + octets[-3:-2] + octets[-1:] if len(octets) > 4 else octets
 
 
+def _with_start_in_sum(octets: bytes) -> bytes:
+    """Its checksum counts the `A`, which belongs to none."""
+    return octets[:-3] + b"%02X" % ((int(octets[-3:-1], 16) + 0x41) & 0xFF) + octets[-1:] if len(octets) > 4 else octets
+
+
+def _nothing(octets: bytes) -> bytes:
+    return b""
+
+
 _INNOCENT = ("N2007", "N2008")
 _DRIVE = (("N2012", "station 2"),)
 
@@ -99,6 +108,24 @@ N2_RULE_CASES: tuple[Case, ...] = (
         partial(impatient, (LateResponse(0.06, 300 * MS, ("drive 2",)),)),
         (("N2011", "station 2"),),
         never=_INNOCENT,
+    ),
+    Case(
+        "N2 checksum off", n2, _DRIVE, hear=partial(_edited, _with_start_in_sum, ("drive 2",)), never=_INNOCENT, seeds=1
+    ),
+    Case(
+        "N2 one drive not heard here",
+        n2,
+        (("N2015", "bus"),),
+        hear=partial(_edited, _nothing, ("drive 2",)),
+        never=("N2005", *_INNOCENT),
+    ),
+    Case(
+        "N2 only the master heard",
+        n2,
+        (("N2015", "bus"),),
+        hear=partial(_edited, _nothing, ("drive 1", "drive 2")),
+        never=("N2005", *_INNOCENT),
+        seeds=1,
     ),
     Case("N2 bit errors everywhere", partial(n2, (BitFlips(4e-3),)), (("N2004", "bus"),), never=_INNOCENT),
     Case(

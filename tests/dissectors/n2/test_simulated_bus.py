@@ -442,3 +442,8 @@ def test_noise_loses_no_octet_and_no_exchange():
 
 def test_a_catalogue_entry_for_each_finding():
     assert all(code == rule.code and rule.explanation and rule.next for code, rule in RULES.items())
+
+
+def test_nobody_heard_but_a_master_that_waits_is_one_finding_about_the_bus():
+    heard = listen(bus([], [quick([reading(3, 1, 1), reading(4, 1, 1)])]), 60 * S)
+    assert [(f.code, f.subject, f.severity) for f in heard.findings] == [("N2005", "bus", Severity.ERROR)]

@@ -58,7 +58,7 @@ def exchanges(count: int, outputs: bytes = b"\0", wait: int = 1) -> list[tuple[i
 
 
 def test_rubbish_in_the_place_of_an_answer_shows_no_station() -> None:
-    asked = [(2, telegram(9, 1, 0x5D | at % 2 << 5, dsap=60, ssap=62)) for at in range(6)]
+    asked = [(2, telegram(9, 1, 0x6D, dsap=60 - at % 2, ssap=62)) for at in range(6)]
     judge = judged([*exchanges(2), *asked[:3], (1, b"\xfe\x00\xf8"), *asked[3:], *exchanges(2)])
     silent = found(judge, "PB001")
     assert silent is not None

@@ -1,0 +1,58 @@
+"""A station that answers into the next command, and is hardly ever heard besides."""
+
+from __future__ import annotations
+
+import pytest
+
+from dissectors.findings import Severity
+from dissectors.frame import Chunk
+from dissectors.line import MS, LineSettings, Timing
+from dissectors.n2 import N2
+from dissectors.n2.envelope import make_answer, make_command
+from dissectors.n2.findings import N2Findings
+from sniff.engine.engine import Engine, Output
+
+LINE = LineSettings.parse("9600,8N1")
+SPOILT = b">031102@\x08140000E9\r"
+"""A command to 3 that an answer fell on."""
+
+
+def told(turns: list[list[bytes]], wait: int = 270) -> set[tuple[str, str]]:
+    """What is said as a warning at least of turns, `wait` ms apart: a command, and what follows it after 12 ms."""
+    judge, engine, now = N2Findings(Timing(LINE)), Engine(N2, Timing(LINE)), 10**12
+
+    def take(output: Output) -> None:
+        for row in output.rows:
+            judge.see(row.no, row.event, row.header, row.placement)
+        for transaction in output.transactions:
+            judge.settle(transaction)
+
+    for turn in turns:
+        for at, octets in enumerate(turn):
+            now += (12 if at else wait) * MS + len(octets) * LINE.char
+            take(engine.feed(Chunk(now, octets)))
+    take(engine.close())
+    return {(one.code, one.subject) for one in judge.findings() if one.severity >= Severity.WARNING}
+
+
+def asked(station: int) -> list[bytes]:
+    return [make_command(f"{station:02X}110103"), make_answer("0041A00000")]
+
+
+@pytest.mark.parametrize(
+    ("late", "is_told"),
+    [([asked(2)[:1], [SPOILT]], True), ([[SPOILT], asked(2)[:1]], False), ([asked(2)[:1], asked(3)], False)],
+)
+def test_commands_damaged_behind_one_to_it_show_who_is_late(late: list[list[bytes]], is_told: bool) -> None:
+    turns = [asked(2)]
+    for _ in range(8):
+        turns += [asked(1), asked(3), asked(1), asked(3), *late]
+    assert (("N2014", "station 2") in told(turns)) is is_told
+
+
+@pytest.mark.parametrize(("wait", "is_told"), [(60, True), (400, False)])
+def test_a_master_that_asks_for_the_next_point_soon_had_its_answer(wait: int, is_told: bool) -> None:
+    """Several points of one station in a row: the next one is no repeat."""
+    commands = [make_command(f"0211{point:02X}03") for point in (1, 2, 3)] * 6
+    found = told([asked(1), *([one] for one in commands), asked(1)], wait)
+    assert found == {("N2015", "bus") if is_told else ("N2005", "station 2")}
