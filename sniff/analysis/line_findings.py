@@ -14,6 +14,7 @@ from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction, Verdict
 from dissectors.words import milliseconds
+from sniff.analysis.breaks import breaks_in
 from sniff.analysis.judgement import Heard, Judgement
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.line_use import LineUse
@@ -77,7 +78,7 @@ class LineFindings:
         self._use = LineUse(session.line)
         adapter = session.adapter
         self._senders = Senders(session.timing, adapter.packets)
-        self._octets = self._in_frames = self._marked = self._rows = self._frames = self._good = 0
+        self._octets = self._in_frames = self._marked = self._low = self._rows = self._frames = self._good = 0
         self._first = self._now = 0
         self._damaged = self._damaged_here = 0  # rows that are no good frame, and those of them with an overrun
         self._overruns, self._lost = Tally(), Tally()
@@ -172,13 +173,12 @@ class LineFindings:
         return self._patterns.stops()
 
     def _see_marks(self, no: int, event: Event) -> None:
-        breaks = sum(bool(mark.error & LineError.BREAK) for mark in event.marks)
-        for _ in range(min(breaks, 1) if self._senders.packets else breaks):
-            self._senders.see_break(no, event.start, isinstance(event, Frame))
+        self._senders.see_breaks(no, event)
         for mark in event.marks:
             if mark.error & LineError.OVERRUN:
                 self._overruns.add(event.start, no)
             self._marked += bool(mark.error & WRONG)
+            self._low += bool(mark.error & LineError.BREAK)
 
     def _see_frame(self, row: Row, frame: Frame) -> str:
         """Gives the sender."""
@@ -217,7 +217,7 @@ class LineFindings:
         self._pending.clear()
 
     def _see_noise(self, no: int, noise: Noise) -> None:
-        if noise.reason in (Reason.BREAK, Reason.PAD) or any(m.error & LineError.BREAK for m in noise.marks):
+        if noise.reason in (Reason.BREAK, Reason.PAD) or breaks_in(noise):
             return
         if self._rows == 1:  # the capture began in the middle of something
             return
@@ -263,7 +263,7 @@ class LineFindings:
     def _of_line(self) -> tuple[Finding, ...]:
         """What may be wrong with a line that can be judged."""
         made: list[Finding] = []
-        if self._senders.are_all_struck(self._marked, self._octets) and 10 * self._in_frames >= 8 * self._octets:
+        if self._senders.are_all_struck() and 10 * self._in_frames >= 8 * self._octets:
             made.append(self._parity_setting())
         else:
             made += self._wrong_octets()
@@ -316,7 +316,7 @@ class LineFindings:
         extremes = sum(self._values[value] for value in (0x00, 0x80, 0xC0, 0xE0, 0xF0, 0xF8, 0xFC, 0xFE, 0xFF))
         total = max(1, sum(self._values.values()))
         reports = self._session.adapter.reports
-        if self._marked * 10 > self._octets or self._senders.breaks.count * 10 > self._octets:
+        if self._marked * 10 > self._octets or self._low * 10 > self._octets:
             words += f"; {self._marked / self._octets:.0%} of all octets have parity or framing errors"
             words += ": the baud rate or the format is wrong, or A and B are swapped"
         elif 2 * extremes > total:

@@ -65,8 +65,9 @@ _ALL = (
         "LN004",
         Severity.ERROR,
         "parity set differently from the bus",
-        "Over 1 in 10 octets with a parity or framing error, whoever sends (a sender that is struck far more than the "
-        "others aside), while at least 8 in 10 octets are in good frames.",
+        "Over 1 in 10 octets of good frames with a parity or framing error (1 in 2 where one flag covers a whole "
+        "packet), whoever sends (a sender that is struck far more than the others aside), while at least 8 in 10 "
+        "octets are in good frames. Octets that are no frame do not count: those are somebody else's.",
         "the port listens with another parity than the bus has; frames get through by their check alone",
         "the parity of the bus (8E1, 8O1, 8N1, 8N2), and set it with -s",
     ),
@@ -122,8 +123,11 @@ _ALL = (
         "LN103",
         Severity.WARNING,
         "breaks",
-        "The line was held low for longer than a character. A single one is only noted. Where 8 in 10 of them are in "
-        "or directly after the frames of one station, far more than its share, that station is named.",
+        "The line was held low for longer than a character. Counted are disturbances: all within 250 ms of the first "
+        "are one. One, all within one second, or few (as in LN101) are only noted. Where at least four, and 8 in 10 "
+        "of them, begin in or directly after the frames of one station, far more than its share, that station is "
+        "named. No break is a zero octet among others that are no frame, or in a good frame: so sounds another baud "
+        "rate or format.",
         "no fail-safe bias while nobody drives the line, A and B swapped at one device, or a short circuit",
         "bias resistors at one place of the line; A and B of devices added last",
     ),
@@ -257,8 +261,9 @@ _ALL = (
         "LN402",
         Severity.NOTE,
         "many broadcasts",
-        "At least 30 broadcasts that make up 1 in 5 of all octets; a warning from 2 in 5 on. Every station must listen "
-        "to each of them.",
+        "At least 30 broadcasts that make up 1 in 5 of all octets and 3 in 100 of all time; a warning where it is 2 in "
+        "5 of all octets (but not nearly all: a bus that is made for broadcasts) and 15 in 100 of all time. Every "
+        "station must listen to each of them.",
         "a device or a tool that looks for others again and again, or a gateway that lets all broadcasts through",
         "who sends them (`show` with their frames) and why; what the gateway lets through",
     ),
