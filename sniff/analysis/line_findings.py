@@ -383,7 +383,8 @@ class LineFindings:
         fit = self._other_protocol()
         if fit is not None:
             means = f"another protocol on the same line: {fit.means}"
-            return replace(finding, seen=f"{finding.seen}; {fit.seen}", means=means, next=_WHO_SPEAKS_IT)
+            seen = f"{finding.seen}; {fit.seen}"
+            return replace(finding, seen=seen, means=means, next=_WHO_SPEAKS_IT, is_told_apart=True)
         factor = slower_by(rests, line)
         if not factor:
             return finding
@@ -393,6 +394,7 @@ class LineFindings:
             seen=f"{finding.seen}; every level in them lasts a multiple of {factor} bits: they were sent {rate}",
             means="a device that speaks with another baud rate, by its own protocol or by a wrong setting",
             next="which station answers so: its baud rate and protocol; two stations with one address look otherwise",
+            is_told_apart=True,
         )
 
     def _whole(self, code: str, subject: str, words: str) -> Finding:

@@ -29,6 +29,9 @@ _DAMAGE = (
 )
 """What damage to frames is told by, in every protocol."""
 
+_DAMAGED = ("MB005", "MB006", "MB007", "MB009", "N2004", "MS401", "MS402")
+"""What tells of damaged frames whose they are, and so tells of their line errors and remains."""
+
 _ALL = (
     Rule(
         "LN001",
@@ -110,6 +113,7 @@ _ALL = (
         "while the others are mostly in packets without one.",
         "noise while this station sends, weak levels from it, or two that send at once",
         "this station's connector, stub and ground; " + _WIRING,
+        told_by=_DAMAGED,
     ),
     Rule(
         "LN102",
@@ -130,6 +134,7 @@ _ALL = (
         "rate or format.",
         "no fail-safe bias while nobody drives the line, A and B swapped at one device, or a short circuit",
         "bias resistors at one place of the line; A and B of devices added last",
+        told_by=_DAMAGED,
     ),
     Rule(
         "LN104",
@@ -182,6 +187,7 @@ _ALL = (
         "where they are always the same, and where they were sent with a slower baud rate.",
         "damaged frames beyond recognition, another protocol on the same line, or a device with another baud rate",
         "what the stretches have in common: their place, time and first octets",
+        told_by=_DAMAGED,
     ),
     Rule(
         "LN205",

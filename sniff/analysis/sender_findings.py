@@ -239,6 +239,7 @@ class Senders:
                 seen=f"{finding.seen}, though their checks agree",
                 means="this station sends with another parity, or fewer stop bits, than the port listens with",
                 next="its parity and stop bits, against those of the bus",
+                is_told_apart=True,
             )
         if not self.packets and 4 * record.at["at the last octet"] >= 3 * sum(record.at.values()) > 8:
             finding = replace(
