@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
-from dissectors.findings import Finding, Severity, Tally, counted, found, times
+from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, found, times
 from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Noise, Place, Reason, Role
 from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
@@ -18,9 +18,10 @@ from sniff.analysis.breaks import breaks_in
 from sniff.analysis.judgement import Heard, Judgement
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.line_use import LineUse
-from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, other_protocol, what_fits
-from sniff.analysis.sender_findings import BUS, WRONG, Senders
-from sniff.analysis.slower_bus import slower_by
+from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, what_fits
+from sniff.analysis.remains import Remains
+from sniff.analysis.sender_findings import BUS, LEVELS, MASTER, WRONG, Senders
+from sniff.analysis.stray_findings import strays_found
 from sniff.analysis.time_patterns import Stop, TimePatterns
 from sniff.analysis.torn_pieces import TornPieces
 from sniff.analysis.unsure_strays import UnsureStrays
@@ -32,19 +33,17 @@ from sniff.engine.session import LineEvent, LineEventKind, Session
 STRAY_MOST = 3
 """So many octets that are no frame are stray ones; more are the remains of something."""
 
+OUTWEIGHED = 20
+"""So many octets in longer stretches for each stray one, and the strays are theirs."""
+
 ECHOES_LEAST = 3
 """Echoes from which on a repeater or converter is likely, where half of the requests have one."""
-
-MOST_RESTS = 16
-"""Stretches that are no frame and are asked what they may be."""
 
 COUNTED_OCTETS = 4096
 """Of longer rows the octets are not counted by value."""
 
 READ_LATE = MS
 """ns of slack over the adapter's latency that prove a late read (`sniff.engine.late_reads`)."""
-
-_WHO_SPEAKS_IT = "which device still speaks the other protocol: its protocol setting; it does not belong on this line"
 
 
 class _Stray(NamedTuple):
@@ -82,11 +81,11 @@ class LineFindings:
         self._first = self._now = 0
         self._damaged = self._damaged_here = 0  # rows that are no good frame, and those of them with an overrun
         self._overruns, self._lost = Tally(), Tally()
-        self._unplugged, self._stepped, self._rest = Tally(), Tally(), Tally()
+        self._unplugged, self._stepped = Tally(), Tally()
         self._counted: dict[str, Tally] = {}
         self._unplugged_at: int | None = None
         self._away = 0
-        self._lost_octets = self._rest_octets = self._only_heard = 0
+        self._lost_octets = self._only_heard = 0
         self._echo, self._asked = Tally(), 0
         self._values: Counter[int] = Counter()
         self._before_ok = True  # the newest frame
@@ -97,10 +96,7 @@ class LineFindings:
         self._pieces = TornPieces(dissector or dissector_for(session), session.timing, STRAY_MOST)
         self._sample: list[Chunk] = []  # what came first, to ask what else it may be
         self._sampled = 0
-        self._rests: list[bytes] = []  # the first stretches that are no frame
-        self._rest_sample: list[Chunk] = []  # the same, to ask what else they may be
-        self._rests_sampled = 0
-        self._rest_fit: tuple[int, Fit | None] = (0, None)
+        self._remains = Remains(session)
         self._fit: tuple[int, Fit | None] = (0, None)  # asked when so many octets were sampled
 
     # ---- taking in
@@ -196,7 +192,7 @@ class LineFindings:
         if frame.ok:
             self._pieces.forget()
         elif self._pieces.complete(frame.octets):
-            self._take_back_strays()
+            self._take_torn(sender, row.no, frame)
         self._settle_strays(sender, frame.slack)
         self._asker = sender if role is Role.REQUEST else None
         return sender
@@ -216,23 +212,25 @@ class LineFindings:
         self._begins.take_back(self._senders)
         self._pending.clear()
 
+    def _take_torn(self, sender: str, no: int, event: Event) -> None:
+        """What came since the last good frame is one in pieces: neither strays nor octets that are no frame."""
+        self._take_back_strays()
+        self._remains.take_back(self._pieces.remains)
+        self._pieces.take(sender, event.start, no)
+
     def _see_noise(self, no: int, noise: Noise) -> None:
         if noise.reason in (Reason.BREAK, Reason.PAD) or breaks_in(noise):
             return
         if self._rows == 1:  # the capture began in the middle of something
             return
-        if self._pieces.complete(noise.octets):
-            self._take_back_strays()
+        if self._pieces.complete(noise.octets):  # behind the damaged begin, whose sender is known
+            sender = BUS if self._before_ok or self._senders.before is None else self._senders.before
+            self._take_torn(sender, no, noise)
             return
         of_damaged = noise.place is not Place.BETWEEN and not self._before_ok  # where a damaged frame ends nobody knows
         if len(noise.octets) > STRAY_MOST or of_damaged:
-            self._rest.add(noise.start, no)
-            self._rest_octets += len(noise.octets)
-            if len(self._rests) < MOST_RESTS and len(noise.octets) <= 300:
-                self._rests.append(noise.octets)
-            if self._rests_sampled < SAMPLE_OCTETS:
-                self._rest_sample.append(Chunk(noise.end, noise.octets[:SAMPLE_OCTETS], noise.marks))
-                self._rests_sampled += len(noise.octets)
+            self._remains.add(no, noise)
+            self._pieces.count_remains(len(noise.octets))
         elif noise.place is Place.BEFORE or (noise.place is Place.AFTER and self._asker is not None):
             self._pending.append(_Stray(no, noise, self._asker))
             del self._pending[:-8]
@@ -313,7 +311,7 @@ class LineFindings:
         if fit is not None:
             finding = self._whole("LN003", "bus", f"{words}; {fit.seen}")
             return replace(finding, means=fit.means, next=fit.next)
-        extremes = sum(self._values[value] for value in (0x00, 0x80, 0xC0, 0xE0, 0xF0, 0xF8, 0xFC, 0xFE, 0xFF))
+        extremes = sum(self._values[value] for value in LEVELS)
         total = max(1, sum(self._values.values()))
         reports = self._session.adapter.reports
         if self._marked * 10 > self._octets or self._low * 10 > self._octets:
@@ -334,15 +332,6 @@ class LineFindings:
             self._fit = self._sampled, fit
         return fit
 
-    def _other_protocol(self) -> Fit | None:
-        """What the stretches that are no frame are; asked again when there are twice as many."""
-        asked, fit = self._rest_fit
-        if self._rests_sampled >= 2 * asked or (asked < self._rests_sampled >= SAMPLE_OCTETS):
-            session = self._session
-            fit = other_protocol(self._rest_sample, session.line, session.adapter.latency, session.protocol)
-            self._rest_fit = self._rests_sampled, fit
-        return fit
-
     def _parity_setting(self) -> Finding:
         words = (
             f"{self._marked / self._octets:.0%} of the octets have parity or framing errors, "
@@ -358,13 +347,15 @@ class LineFindings:
 
     def _of_bus(self) -> Iterator[Finding]:
         yield from self._senders.breaks_found(self._note_if)
-        yield from self._senders.strays_found(self._note_if)
-        if self._rest.count:
-            share = self._rest_octets / self._octets
-            stretches = counted(self._rest.count, "stretch", "stretches")
-            words = f"{self._rest_octets} octets in {stretches} are no frame, {share:.1%} of all"
-            severity = None if share >= 0.02 and self._rest.count > 1 else Severity.NOTE
-            yield self._of_rests(self._rest.found(RULES["LN204"], "bus", words, severity))
+        rests = self._remains.found(self._octets)
+        for stray in strays_found(self._senders, self._note_if):
+            many = stray.code == "LN203" and stray.subject == BUS and self._remains.octets > OUTWEIGHED * stray.count
+            is_part = rests is not None and rests.severity >= Severity.WARNING and many
+            yield as_consequence(stray, rests, RULES) if rests is not None and is_part else stray
+        if rests is not None:
+            yield rests
+        frames = {name: one.frames for name, one in self._senders.by_name.items() if name != BUS}
+        yield from self._pieces.found(frames, MASTER)
         if self._echo.count:
             words = f"{self._echo.count} of {counted(self._asked, 'request')} came twice, the copy directly behind"
             if self._echo.count > self._asked:  # several copies of one, or of some that are still open
@@ -372,30 +363,6 @@ class LineFindings:
             often = self._echo.count >= ECHOES_LEAST and 2 * self._echo.count >= self._asked
             severity = Severity.WARNING if often else None
             yield self._echo.found(RULES["LN205"], "bus", words, severity)
-
-    def _of_rests(self, finding: Finding) -> Finding:
-        """With what the stretches that are no frame have in common."""
-        rests, line = self._rests, self._session.line
-        same, often = Counter(rests).most_common(1)[0] if rests else (b"", 0)
-        if often >= 3 and 2 * often >= len(rests):
-            words = f"{finding.seen}; the same {len(same)} octets {often} times ({same[:8].hex(' ').upper()}"
-            finding = replace(finding, seen=words + (" …)" if len(same) > 8 else ")"))
-        fit = self._other_protocol()
-        if fit is not None:
-            means = f"another protocol on the same line: {fit.means}"
-            seen = f"{finding.seen}; {fit.seen}"
-            return replace(finding, seen=seen, means=means, next=_WHO_SPEAKS_IT, is_told_apart=True)
-        factor = slower_by(rests, line)
-        if not factor:
-            return finding
-        rate = f"{factor} times slower, at about {line.baud // factor} Bd" if factor < 12 else "over 10 times slower"
-        return replace(
-            finding,
-            seen=f"{finding.seen}; every level in them lasts a multiple of {factor} bits: they were sent {rate}",
-            means="a device that speaks with another baud rate, by its own protocol or by a wrong setting",
-            next="which station answers so: its baud rate and protocol; two stations with one address look otherwise",
-            is_told_apart=True,
-        )
 
     def _whole(self, code: str, subject: str, words: str) -> Finding:
         return found(RULES[code], subject, words, first=self._first, last=self._now)

@@ -199,6 +199,17 @@ _ALL = (
         "the echo setting of the master's adapter or of the converter; it halves the time left on the bus",
     ),
     Rule(
+        "LN206",
+        Severity.WARNING,
+        "frames in pieces",
+        "Two or three rows, each of four octets or more, that are no good frame, and put together are one whose check "
+        "agrees: a pause tore it. From three on and 1 in 20 of its frames, clearly more than its share, the "
+        "sender is named; else it is only noted.",
+        "a link that delivers this sender's frames in pieces (a radio, a modem, a gateway), or firmware that pauses",
+        "the packet size and delay of the link, the firmware; whether whoever reads by silence takes such frames",
+        explains=("LN204", "MB005", "MB007", "MB009", "N2004", "MS401", "MS402"),
+    ),
+    Rule(
         "LN301",
         Severity.WARNING,
         "disturbances in step with the mains",

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from dissectors.chances import at_least
-from dissectors.findings import Finding, Severity, Tally, counted, times
+from dissectors.findings import Finding, Severity, Tally, counted
 from dissectors.frame import Event, Frame, LineError, Mark, Noise
 from dissectors.line import Timing
 from dissectors.strikes import Strikes
@@ -25,6 +25,9 @@ MOST_SENDERS = 600
 BREAKS_LEAST = 4
 NEAR = 12
 """Characters behind a frame within which a break belongs to whoever sent it."""
+
+LEVELS = frozenset((0x00, 0x80, 0xC0, 0xE0, 0xF0, 0xF8, 0xFC, 0xFE, 0xFF))
+"""Octets that one change of the level makes."""
 
 PACKETS_LEAST = 4
 ALL_STRUCK = 8
@@ -300,86 +303,6 @@ class Senders:
                 yield self.breaks.of_sender(name, struck)
                 return
         yield self.breaks.of_bus(severity)
-
-    def strays_found(self, note_if: NoteIf) -> Iterator[Finding]:
-        """Stray octets: of a sender that has more than its share of them, else of the bus, told once."""
-        own: list[tuple[str, str]] = []
-        common: dict[str, list[str]] = {"LN201": [], "LN202": []}
-        for code, names in common.items():
-            counts = {
-                name: (one.stray[code].count if code in one.stray else 0, float(one.frames))
-                for name, one in self.by_name.items()
-                if name != BUS
-            }
-            out = standing_out(counts, MASTER)
-            if not self.beside:  # what lies in the silence before it asks is no sign of the master
-                out.discard(MASTER)
-            own += [(name, code) for name in sorted(out)]
-            names += sorted(name for name, (count, _) in counts.items() if count and name not in out)
-            if BUS in self.by_name and code in self.by_name[BUS].stray:  # beside a frame of nobody knows whom
-                names.append(BUS)
-        silence = self.by_name[BUS].stray.get("LN203") if BUS in self.by_name else None
-        among = {code: together(self.by_name[name].stray[code] for name in names) for code, names in common.items()}
-        total = sum(tally.count for tally in among.values()) + (silence.count if silence is not None else 0)
-        for code, names in common.items():
-            alone = names[0] if len(names) == 1 else BUS
-            if code == "LN201" and alone == MASTER and not self.beside:
-                continue
-            if alone != BUS and 2 * among[code].count > total:  # nobody else is struck
-                own += [(names[0], code)]
-                total -= among.pop(code).count
-        of_own = 0
-        for name, code in own:
-            record = self.by_name[name]
-            of_own += record.stray[code].count
-            yield self._stray_finding(code, name, record.values, record.stray[code], record.frames, note_if)
-        if total:
-            found = self._of_all(among, silence, common, note_if)
-            yield replace(found, severity=Severity.NOTE) if 3 * total <= of_own else found  # most likely theirs too
-
-    def _of_all(
-        self, among: dict[str, Tally], silence: Tally | None, names: dict[str, list[str]], note_if: NoteIf
-    ) -> Finding:
-        """One finding about noise that no sender stands out by."""
-        values: Counter[tuple[str, int]] = Counter()
-        for code in among:
-            for name in names[code]:
-                values.update({key: n for key, n in self.by_name[name].values.items() if key[0] == code})
-        if silence is not None:
-            values.update({key: n for key, n in self.by_name[BUS].values.items() if key[0] == "LN203"})
-            among = {**among, "LN203": silence}
-        tally = together(among.values())
-        code = max(among, key=lambda one: among[one].count)
-        if among[code].count < 0.85 * tally.count:
-            code = "LN203"
-        values = Counter({(code, value): count for (_, value), count in values.items()})
-        parts = {"LN201": "before", "LN202": "after", "LN203": "away from"}
-        spread = ", ".join(
-            f"{among[one].count} {word}" for one, word in parts.items() if one in among and among[one].count
-        )
-        finding = self._stray_finding(code, BUS, values, tally, self.frames, note_if)
-        if sum(one.count > 0 for one in among.values()) > 1:
-            finding = replace(finding, seen=f"{finding.seen}: {spread} frames, whoever sends")
-        elif code != "LN203":
-            finding = replace(finding, seen=f"{finding.seen}, whoever sends")
-        return finding
-
-    def _stray_finding(
-        self, code: str, name: str, values: Counter[tuple[str, int]], tally: Tally, frames: int, note_if: NoteIf
-    ) -> Finding:
-        where = {"LN201": "before", "LN202": "after"}.get(code)
-        if where is None:
-            words = f"stray octets {times(tally.count)} in the silence between {counted(frames, 'frame')}"
-        elif tally.count > frames:
-            words = f"stray octets {times(tally.count)} {where} {counted(frames, 'frame')}"
-        else:
-            words = f"stray octets {where} {tally.count} of {counted(frames, 'frame')}"
-        counts = [(value, count) for (rule, value), count in values.most_common() if rule == code]
-        most = counts[:4]
-        if 2 * sum(count for _, count in most) > sum(count for _, count in counts):
-            mostly = "" if len(counts) == len(most) else "mostly "
-            words += f" ({mostly}{', '.join(f'{value:02X}' for value, _ in most)})"
-        return tally.found(RULES[code], name, words, note_if(tally.count, frames))
 
 
 def together(tallies: Iterable[Tally]) -> Tally:

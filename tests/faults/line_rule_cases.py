@@ -11,7 +11,16 @@ from dissectors.simulated_faults import Break, MarkParity, NoiseInGaps
 from sniff.simulation.tap import FTDI
 from tests.faults.buses import modbus, n2
 from tests.faults.case import Case
-from tests.faults.line_faults import Anywhere, AtTimes, as_protocol, by_other_uart, masked, paused, with_settings
+from tests.faults.line_faults import (
+    Anywhere,
+    AtTimes,
+    InPieces,
+    as_protocol,
+    by_other_uart,
+    masked,
+    paused,
+    with_settings,
+)
 from tests.faults.stations import Dies, Of
 
 MS = 1_000_000
@@ -57,6 +66,11 @@ LINE_RULE_CASES: tuple[Case, ...] = (
         FTDI,
     ),
     Case("line, breaks of one station", partial(modbus, (Of("unit 2", Break(0.1)),)), (("LN103", "station 2"),)),
+    Case(
+        "line, one station in pieces",
+        partial(modbus, (InPieces("unit 2", 40 * MS),), pause=100 * MS),
+        (("LN206", "station 2"),),
+    ),
     Case("line, noise anywhere", partial(_five, (NoiseInGaps(0.1),)), (("LN203", "bus"),)),
     Case(
         "line, ringing after everybody",
