@@ -20,7 +20,7 @@ from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.line_use import LineUse
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, what_fits
 from sniff.analysis.remains import Remains
-from sniff.analysis.sender_findings import BUS, LEVELS, MASTER, WRONG, Senders
+from sniff.analysis.sender_findings import BUS, LEVELS, MASTER, MOST_SENDERS, WRONG, Senders
 from sniff.analysis.stray_findings import strays_found
 from sniff.analysis.time_patterns import Stop, TimePatterns
 from sniff.analysis.torn_pieces import TornPieces
@@ -47,11 +47,12 @@ READ_LATE = MS
 
 
 class _Stray(NamedTuple):
-    """Stray octets beside a frame; `asker`: who had asked before them, where an answer was due."""
+    """Stray octets beside a frame; `asker`: who had asked before them, where an answer was due; `asked`: whom."""
 
     no: int
     noise: Noise
     asker: str | None
+    asked: str | None
 
     def told(self, sender: str) -> tuple[str, str]:
         """Whose they are and by which rule, once `sender` has sent a frame.
@@ -91,6 +92,9 @@ class LineFindings:
         self._before_ok = True  # the newest frame
         self._awaiting = False  # a request was the newest frame of a known kind
         self._asker: str | None = None  # who sent the newest frame, if that was a request
+        self._called_last: str | None = None  # whom the newest frame was sent to
+        self._awaited = 0  # strays away from frames, while an answer is due
+        self._instead: Counter[str] = Counter()  # strays that came in place of an answer, by who was asked
         self._pending: list[_Stray] = []  # noise beside frames, of which the frame to come tells
         self._begins = UnsureStrays()  # noise that may be the begin of the frame to come
         self._pieces = TornPieces(dissector or dissector_for(session), session.timing, STRAY_MOST)
@@ -195,17 +199,31 @@ class LineFindings:
             self._take_torn(sender, row.no, frame)
         self._settle_strays(sender, frame.slack)
         self._asker = sender if role is Role.REQUEST else None
+        asked = row.placement.destination if row.placement is not None else None
+        self._called_last = self._called(asked, frame.protocol)
         return sender
+
+    def _called(self, station: int | None, protocol: str) -> str | None:
+        return None if station is None else f"{self._nouns(protocol)} {station}"
 
     def _settle_strays(self, sender: str, slack: int) -> None:
         """A frame has come, read at most `slack` ns late: what the octets before it were."""
         if slack <= self._session.timing.latency + READ_LATE:
             for stray in self._pending:
-                self._senders.stray(*stray.told(sender), stray.no, stray.noise)
+                name, code = stray.told(sender)
+                self._senders.stray(name, code, stray.no, stray.noise)
+                self._count_instead(code == "LN203", stray.asked)
+            if sender == self._asker:
+                self._count_instead(self._awaited, self._called_last)
             self._begins.forget()
             self._pending.clear()
         else:
             self._take_back_strays()
+        self._awaited = 0
+
+    def _count_instead(self, count: int, asked: str | None) -> None:
+        if count and asked is not None and len(self._instead) < MOST_SENDERS:
+            self._instead[asked] += count
 
     def _take_back_strays(self) -> None:
         """They are what was read in time of a frame that was torn."""
@@ -232,11 +250,12 @@ class LineFindings:
             self._remains.add(no, noise)
             self._pieces.count_remains(len(noise.octets))
         elif noise.place is Place.BEFORE or (noise.place is Place.AFTER and self._asker is not None):
-            self._pending.append(_Stray(no, noise, self._asker))
+            self._pending.append(_Stray(no, noise, self._asker, self._called_last))
             del self._pending[:-8]
         elif noise.place is Place.AFTER and self._senders.before is not None:
             self._begins.add(self._senders, self._senders.before, "LN202", no, noise)
         else:
+            self._awaited += self._asker is not None
             self._begins.add(self._senders, BUS, "LN203", no, noise)
 
     # ---- judging
@@ -348,7 +367,7 @@ class LineFindings:
     def _of_bus(self) -> Iterator[Finding]:
         yield from self._senders.breaks_found(self._note_if)
         rests = self._remains.found(self._octets)
-        for stray in strays_found(self._senders, self._note_if):
+        for stray in strays_found(self._senders, self._instead, self._note_if):
             many = stray.code == "LN203" and stray.subject == BUS and self._remains.octets > OUTWEIGHED * stray.count
             is_part = rests is not None and rests.severity >= Severity.WARNING and many
             yield as_consequence(stray, rests, RULES) if rests is not None and is_part else stray

@@ -173,7 +173,8 @@ _ALL = (
         Severity.WARNING,
         "stray octets in silence",
         "One to three octets that are no frame, with silence on both sides, or anywhere, whoever sends before or "
-        "after. A single one, or fewer than 1 to 100 frames and at most two a minute, is only noted.",
+        "after. A single one, or fewer than 1 to 100 frames and at most two a minute, is only noted; so is what comes in "
+        "place of the answers of one station, at that station.",
         "the line floats when nobody drives it: no or weak fail-safe bias; or noise coupled in",
         "bias at one place of the line; the cable's way along power lines and motors",
         explains=("LN204",),

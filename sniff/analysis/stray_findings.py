@@ -11,9 +11,13 @@ from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.sender_findings import BUS, LEVELS, MASTER, NoteIf, Senders, together
 from sniff.analysis.shares import standing_out
 
+INSTEAD_LEAST, INSTEAD = 3, 0.7
+"""So many stray octets, and of all of them, in place of one station's answers: they are its own."""
 
-def strays_found(senders: Senders, note_if: NoteIf) -> Iterator[Finding]:
-    """Stray octets: of a sender that has more than its share of them, else of the bus, told once."""
+
+def strays_found(senders: Senders, instead: Counter[str], note_if: NoteIf) -> Iterator[Finding]:
+    """Stray octets: of a sender that has more than its share of them, else of the bus, told once. `instead`: how many
+    came in place of an answer, by the station that was asked."""
     own: list[tuple[str, str]] = []
     common: dict[str, list[str]] = {"LN201": [], "LN202": []}
     for code, names in common.items():
@@ -49,11 +53,28 @@ def strays_found(senders: Senders, note_if: NoteIf) -> Iterator[Finding]:
         yield found
     if total:
         found, values = _of_all(senders, among, silence, common, note_if)
+        found = _of_one_asked(found, instead, senders)
         theirs = [one for one, own_values in told if values.keys() <= own_values and total <= one.count]
         if theirs:  # the same octets, seen apart from the frame
             yield as_consequence(found, theirs[0], RULES)
         else:
             yield replace(found, severity=Severity.NOTE) if 3 * total <= of_own else found  # most likely theirs too
+
+
+def _of_one_asked(finding: Finding, instead: Counter[str], senders: Senders) -> Finding:
+    """What is found of silence, of the station in place of whose answers it is; that others are asked too is known."""
+    ((name, count),) = instead.most_common(1) or (("", 0),)
+    others = len(senders.by_name.keys() - {BUS, MASTER, name})
+    if finding.code != "LN203" or not others or count < max(INSTEAD_LEAST, INSTEAD * finding.count):
+        return finding
+    return replace(
+        finding,
+        subject=name,
+        severity=Severity.NOTE,  # that it does not answer is told by the protocol's rules
+        seen=f"{finding.seen}; {count} of them in place of its answers",
+        means="something is connected at this address and moves the line: a driver without data, the end of an answer",
+        next="its supply, its driver's direction control, its connection",
+    )
 
 
 def _of_all(

@@ -45,26 +45,6 @@ class AtTimes:
 
 
 @dataclass(frozen=True, slots=True)
-class InPieces:
-    """What a party sends comes in two pieces with `pause` ns of silence between, as behind a radio link.
-
-    The master must wait for the second one: its pause before it asks again has to be longer.
-    """
-
-    party: str
-    pause: int
-    name: ClassVar[str] = "in-pieces"
-
-    def strike(self, sent: Transmission, now: int, line: LineSettings, dice: Random) -> tuple[Transmission, ...]:
-        """Tear it."""
-        if sent.party != self.party:
-            return (sent,)
-        half = len(sent.octets) // 2
-        first = sent.hit(self.name, octets=sent.octets[:half])
-        return (first, Transmission(NOISE, first.end(line) + self.pause, b"", sent.octets[half:], faults=(self.name,)))
-
-
-@dataclass(frozen=True, slots=True)
 class Anywhere:
     """A few random octets anywhere in the silence behind a transmission, `rate` for each."""
 
