@@ -173,8 +173,8 @@ _ALL = (
         Severity.WARNING,
         "stray octets in silence",
         "One to three octets that are no frame, with silence on both sides, or anywhere, whoever sends before or "
-        "after. A single one, or fewer than 1 to 100 frames and at most two a minute, is only noted; so is what comes in "
-        "place of the answers of one station, at that station.",
+        "after. A single one, or fewer than 1 to 100 frames and at most two a minute, is only noted; so is what comes "
+        "in place of the answers of one station, at that station.",
         "the line floats when nobody drives it: no or weak fail-safe bias; or noise coupled in",
         "bias at one place of the line; the cable's way along power lines and motors",
         explains=("LN204",),
@@ -208,7 +208,7 @@ _ALL = (
         "sender is named; else it is only noted.",
         "a link that delivers this sender's frames in pieces (a radio, a modem, a gateway), or firmware that pauses",
         "the packet size and delay of the link, the firmware; whether whoever reads by silence takes such frames",
-        explains=("LN204", "MB005", "MB007", "MB009", "N2004", "MS401", "MS402"),
+        explains=("LN204", "LN301", "LN302", "LN303", "MB005", "MB007", "MB009", "N2004", "MS401", "MS402"),
     ),
     Rule(
         "LN301",
