@@ -43,7 +43,9 @@ class Rule:
 
     `title`: some words for a list. `explanation`: plain text for `rule CODE`: what is measured, against which limit,
     from which source. `means`, `next`: the defaults of its findings. `explains`: codes, or begins of codes, of what is
-    most likely a mere consequence of what this rule finds, at warning or above.
+    most likely a mere consequence of what this rule finds, at warning or above. `told_by`: the same of what tells the
+    same trouble better: where one of those stands, of the same subject, this rule's finding is a note under it; what
+    this rule finds of the bus stands under that of one station only where it is the only one that is struck.
     """
 
     code: str
@@ -53,6 +55,7 @@ class Rule:
     means: str = ""
     next: str = ""
     explains: tuple[str, ...] = ()
+    told_by: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +68,8 @@ class Finding:
     characters. `cause`: code and subject of the finding that most likely explains this one; a face shows this one
     under it. `stated`: the value behind the words, where whoever found it had one. `stations`: of what is found about
     the bus, the stations that it concerns; empty: everybody. `is_once`: it is said once of a capture and its count is
-    no number of times.
+    no number of times. `is_told_apart`: its own words name a cause that no other finding tells, so that it stands for
+    itself (`Rule.told_by`).
     """
 
     code: str
@@ -82,6 +86,7 @@ class Finding:
     stated: Subject | None = None
     stations: tuple[int, ...] = ()
     is_once: bool = False
+    is_told_apart: bool = False
 
     @property
     def about(self) -> Subject:
@@ -236,7 +241,28 @@ def with_consequences(findings: Iterable[Finding], rules: Mapping[str, Rule]) ->
         for other, finding in enumerate(made):
             if other != at and finding.cause is None and codes and _is_explained(finding, cause, codes):
                 made[other] = as_consequence(finding, cause, rules)
+    return _told_once(made, rules)
+
+
+def _told_once(findings: list[Finding], rules: Mapping[str, Rule]) -> tuple[Finding, ...]:
+    """The same findings; those whose trouble another one tells that stands for itself (`Rule.told_by`) name it."""
+    standing = [one for one in findings if one.cause is None and one.severity >= Severity.WARNING]
+    made: list[Finding] = []
+    for finding in findings:
+        is_open = finding.cause is None and not finding.is_told_apart and finding.code in rules
+        codes = rules[finding.code].told_by if is_open else ()
+        tell = [one for one in standing if codes and one.code.startswith(codes) and one.severity >= finding.severity]
+        same = [one for one in tell if one.about == finding.about]
+        if not same and finding.about.is_whole_bus and len({one.subject for one in tell}) == 1:
+            same = tell
+        made.append(_told_under(finding, same[0], rules) if same else finding)
     return tuple(made)
+
+
+def _told_under(finding: Finding, told: Finding, rules: Mapping[str, Rule]) -> Finding:
+    under = as_consequence(finding, told, rules)
+    title = rules[told.code].title if told.code in rules else ""
+    return replace(under, means=f"most likely the same trouble as {told.code} ({told.subject}: {title})")
 
 
 def _is_explained(finding: Finding, cause: Finding, codes: tuple[str, ...]) -> bool:

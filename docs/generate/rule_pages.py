@@ -96,8 +96,13 @@ def _explained(rule: Rule) -> Iterator[str]:
         if text:
             yield from ("", f"**{word}:** {told(text)}.")
     if rule.explains:
-        links = ", ".join(f"[{code}]({page_of(code)})" if len(code) == 5 else f"{code}…" for code in rule.explains)
-        yield from ("", f"**Explains,** where it is a warning or an error: {links}.")
+        yield from ("", f"**Explains,** where it is a warning or an error: {_links(rule.explains)}.")
+    if rule.told_by:
+        yield from ("", f"**Told by,** where one of them speaks of the same: {_links(rule.told_by)}.")
+
+
+def _links(codes: tuple[str, ...]) -> str:
+    return ", ".join(f"[{code}]({page_of(code)})" if len(code) == 5 else f"{code}…" for code in codes)
 
 
 def _shown(code: str) -> Iterator[str]:

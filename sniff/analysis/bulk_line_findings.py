@@ -78,6 +78,8 @@ class BulkLineFindings(LineFindings):
 
     def _see_run(self, columns: LineColumns, begin: int, end: int) -> None:
         """Take good frames that follow one another, which have been counted."""
+        from dissectors.columns import NONE
+
         table = columns.table
         first, last = (columns.name(int(columns.sender[place]), self._nouns) for place in (begin, end - 1))
         self._pieces.forget()
@@ -87,6 +89,8 @@ class BulkLineFindings(LineFindings):
         role = columns.role_before(begin, end)
         self._awaiting = self._awaiting if role is None else role is Role.REQUEST
         self._asker = last if columns.role_before(end - 1, end) is Role.REQUEST else None
+        asked = int(table.placed.destination[end - 1]) if table.placed.tx[end - 1] else NONE
+        self._called_last = self._called(None if asked == NONE else asked, table.protocol)
         self._before_ok = True
         self._patterns.see_good(table.frames.end[begin:end])
 

@@ -8,18 +8,20 @@ from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
-from dissectors.findings import Finding, Severity, Tally, counted, found, times
+from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, found, times
 from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Noise, Place, Reason, Role
 from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction, Verdict
 from dissectors.words import milliseconds
+from sniff.analysis.breaks import breaks_in
 from sniff.analysis.judgement import Heard, Judgement
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.line_use import LineUse
-from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, other_protocol, what_fits
-from sniff.analysis.sender_findings import BUS, WRONG, Senders
-from sniff.analysis.slower_bus import slower_by
+from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, what_fits
+from sniff.analysis.remains import Remains
+from sniff.analysis.sender_findings import BUS, LEVELS, MASTER, MOST_SENDERS, WRONG, Senders
+from sniff.analysis.stray_findings import strays_found
 from sniff.analysis.time_patterns import Stop, TimePatterns
 from sniff.analysis.torn_pieces import TornPieces
 from sniff.analysis.unsure_strays import UnsureStrays
@@ -31,11 +33,11 @@ from sniff.engine.session import LineEvent, LineEventKind, Session
 STRAY_MOST = 3
 """So many octets that are no frame are stray ones; more are the remains of something."""
 
+OUTWEIGHED = 20
+"""So many octets in longer stretches for each stray one, and the strays are theirs."""
+
 ECHOES_LEAST = 3
 """Echoes from which on a repeater or converter is likely, where half of the requests have one."""
-
-MOST_RESTS = 16
-"""Stretches that are no frame and are asked what they may be."""
 
 COUNTED_OCTETS = 4096
 """Of longer rows the octets are not counted by value."""
@@ -43,15 +45,14 @@ COUNTED_OCTETS = 4096
 READ_LATE = MS
 """ns of slack over the adapter's latency that prove a late read (`sniff.engine.late_reads`)."""
 
-_WHO_SPEAKS_IT = "which device still speaks the other protocol: its protocol setting; it does not belong on this line"
-
 
 class _Stray(NamedTuple):
-    """Stray octets beside a frame; `asker`: who had asked before them, where an answer was due."""
+    """Stray octets beside a frame; `asker`: who had asked before them, where an answer was due; `asked`: whom."""
 
     no: int
     noise: Noise
     asker: str | None
+    asked: str | None
 
     def told(self, sender: str) -> tuple[str, str]:
         """Whose they are and by which rule, once `sender` has sent a frame.
@@ -77,29 +78,29 @@ class LineFindings:
         self._use = LineUse(session.line)
         adapter = session.adapter
         self._senders = Senders(session.timing, adapter.packets)
-        self._octets = self._in_frames = self._marked = self._rows = self._frames = self._good = 0
+        self._octets = self._in_frames = self._marked = self._low = self._rows = self._frames = self._good = 0
         self._first = self._now = 0
         self._damaged = self._damaged_here = 0  # rows that are no good frame, and those of them with an overrun
         self._overruns, self._lost = Tally(), Tally()
-        self._unplugged, self._stepped, self._rest = Tally(), Tally(), Tally()
+        self._unplugged, self._stepped = Tally(), Tally()
         self._counted: dict[str, Tally] = {}
         self._unplugged_at: int | None = None
         self._away = 0
-        self._lost_octets = self._rest_octets = self._only_heard = 0
+        self._lost_octets = self._only_heard = 0
         self._echo, self._asked = Tally(), 0
         self._values: Counter[int] = Counter()
         self._before_ok = True  # the newest frame
         self._awaiting = False  # a request was the newest frame of a known kind
         self._asker: str | None = None  # who sent the newest frame, if that was a request
+        self._called_last: str | None = None  # whom the newest frame was sent to
+        self._awaited = 0  # strays away from frames, while an answer is due
+        self._instead: Counter[str] = Counter()  # strays that came in place of an answer, by who was asked
         self._pending: list[_Stray] = []  # noise beside frames, of which the frame to come tells
         self._begins = UnsureStrays()  # noise that may be the begin of the frame to come
         self._pieces = TornPieces(dissector or dissector_for(session), session.timing, STRAY_MOST)
         self._sample: list[Chunk] = []  # what came first, to ask what else it may be
         self._sampled = 0
-        self._rests: list[bytes] = []  # the first stretches that are no frame
-        self._rest_sample: list[Chunk] = []  # the same, to ask what else they may be
-        self._rests_sampled = 0
-        self._rest_fit: tuple[int, Fit | None] = (0, None)
+        self._remains = Remains(session)
         self._fit: tuple[int, Fit | None] = (0, None)  # asked when so many octets were sampled
 
     # ---- taking in
@@ -172,13 +173,12 @@ class LineFindings:
         return self._patterns.stops()
 
     def _see_marks(self, no: int, event: Event) -> None:
-        breaks = sum(bool(mark.error & LineError.BREAK) for mark in event.marks)
-        for _ in range(min(breaks, 1) if self._senders.packets else breaks):
-            self._senders.see_break(no, event.start, isinstance(event, Frame))
+        self._senders.see_breaks(no, event)
         for mark in event.marks:
             if mark.error & LineError.OVERRUN:
                 self._overruns.add(event.start, no)
             self._marked += bool(mark.error & WRONG)
+            self._low += bool(mark.error & LineError.BREAK)
 
     def _see_frame(self, row: Row, frame: Frame) -> str:
         """Gives the sender."""
@@ -196,49 +196,66 @@ class LineFindings:
         if frame.ok:
             self._pieces.forget()
         elif self._pieces.complete(frame.octets):
-            self._take_back_strays()
+            self._take_torn(sender, row.no, frame)
         self._settle_strays(sender, frame.slack)
         self._asker = sender if role is Role.REQUEST else None
+        asked = row.placement.destination if row.placement is not None else None
+        self._called_last = self._called(asked, frame.protocol)
         return sender
+
+    def _called(self, station: int | None, protocol: str) -> str | None:
+        return None if station is None else f"{self._nouns(protocol)} {station}"
 
     def _settle_strays(self, sender: str, slack: int) -> None:
         """A frame has come, read at most `slack` ns late: what the octets before it were."""
         if slack <= self._session.timing.latency + READ_LATE:
             for stray in self._pending:
-                self._senders.stray(*stray.told(sender), stray.no, stray.noise)
+                name, code = stray.told(sender)
+                self._senders.stray(name, code, stray.no, stray.noise)
+                self._count_instead(code == "LN203", stray.asked)
+            if sender == self._asker:
+                self._count_instead(self._awaited, self._called_last)
             self._begins.forget()
             self._pending.clear()
         else:
             self._take_back_strays()
+        self._awaited = 0
+
+    def _count_instead(self, count: int, asked: str | None) -> None:
+        if count and asked is not None and len(self._instead) < MOST_SENDERS:
+            self._instead[asked] += count
 
     def _take_back_strays(self) -> None:
         """They are what was read in time of a frame that was torn."""
         self._begins.take_back(self._senders)
         self._pending.clear()
 
+    def _take_torn(self, sender: str, no: int, event: Event) -> None:
+        """What came since the last good frame is one in pieces: neither strays nor octets that are no frame."""
+        self._take_back_strays()
+        self._remains.take_back(self._pieces.remains)
+        self._pieces.take(sender, event.start, no)
+
     def _see_noise(self, no: int, noise: Noise) -> None:
-        if noise.reason in (Reason.BREAK, Reason.PAD) or any(m.error & LineError.BREAK for m in noise.marks):
+        if noise.reason in (Reason.BREAK, Reason.PAD) or breaks_in(noise):
             return
         if self._rows == 1:  # the capture began in the middle of something
             return
-        if self._pieces.complete(noise.octets):
-            self._take_back_strays()
+        if self._pieces.complete(noise.octets):  # behind the damaged begin, whose sender is known
+            sender = BUS if self._before_ok or self._senders.before is None else self._senders.before
+            self._take_torn(sender, no, noise)
             return
         of_damaged = noise.place is not Place.BETWEEN and not self._before_ok  # where a damaged frame ends nobody knows
         if len(noise.octets) > STRAY_MOST or of_damaged:
-            self._rest.add(noise.start, no)
-            self._rest_octets += len(noise.octets)
-            if len(self._rests) < MOST_RESTS and len(noise.octets) <= 300:
-                self._rests.append(noise.octets)
-            if self._rests_sampled < SAMPLE_OCTETS:
-                self._rest_sample.append(Chunk(noise.end, noise.octets[:SAMPLE_OCTETS], noise.marks))
-                self._rests_sampled += len(noise.octets)
+            self._remains.add(no, noise)
+            self._pieces.count_remains(len(noise.octets))
         elif noise.place is Place.BEFORE or (noise.place is Place.AFTER and self._asker is not None):
-            self._pending.append(_Stray(no, noise, self._asker))
+            self._pending.append(_Stray(no, noise, self._asker, self._called_last))
             del self._pending[:-8]
         elif noise.place is Place.AFTER and self._senders.before is not None:
             self._begins.add(self._senders, self._senders.before, "LN202", no, noise)
         else:
+            self._awaited += self._asker is not None
             self._begins.add(self._senders, BUS, "LN203", no, noise)
 
     # ---- judging
@@ -263,7 +280,7 @@ class LineFindings:
     def _of_line(self) -> tuple[Finding, ...]:
         """What may be wrong with a line that can be judged."""
         made: list[Finding] = []
-        if self._senders.are_all_struck(self._marked, self._octets) and 10 * self._in_frames >= 8 * self._octets:
+        if self._senders.are_all_struck() and 10 * self._in_frames >= 8 * self._octets:
             made.append(self._parity_setting())
         else:
             made += self._wrong_octets()
@@ -313,10 +330,10 @@ class LineFindings:
         if fit is not None:
             finding = self._whole("LN003", "bus", f"{words}; {fit.seen}")
             return replace(finding, means=fit.means, next=fit.next)
-        extremes = sum(self._values[value] for value in (0x00, 0x80, 0xC0, 0xE0, 0xF0, 0xF8, 0xFC, 0xFE, 0xFF))
+        extremes = sum(self._values[value] for value in LEVELS)
         total = max(1, sum(self._values.values()))
         reports = self._session.adapter.reports
-        if self._marked * 10 > self._octets or self._senders.breaks.count * 10 > self._octets:
+        if self._marked * 10 > self._octets or self._low * 10 > self._octets:
             words += f"; {self._marked / self._octets:.0%} of all octets have parity or framing errors"
             words += ": the baud rate or the format is wrong, or A and B are swapped"
         elif 2 * extremes > total:
@@ -334,15 +351,6 @@ class LineFindings:
             self._fit = self._sampled, fit
         return fit
 
-    def _other_protocol(self) -> Fit | None:
-        """What the stretches that are no frame are; asked again when there are twice as many."""
-        asked, fit = self._rest_fit
-        if self._rests_sampled >= 2 * asked or (asked < self._rests_sampled >= SAMPLE_OCTETS):
-            session = self._session
-            fit = other_protocol(self._rest_sample, session.line, session.adapter.latency, session.protocol)
-            self._rest_fit = self._rests_sampled, fit
-        return fit
-
     def _parity_setting(self) -> Finding:
         words = (
             f"{self._marked / self._octets:.0%} of the octets have parity or framing errors, "
@@ -358,13 +366,15 @@ class LineFindings:
 
     def _of_bus(self) -> Iterator[Finding]:
         yield from self._senders.breaks_found(self._note_if)
-        yield from self._senders.strays_found(self._note_if)
-        if self._rest.count:
-            share = self._rest_octets / self._octets
-            stretches = counted(self._rest.count, "stretch", "stretches")
-            words = f"{self._rest_octets} octets in {stretches} are no frame, {share:.1%} of all"
-            severity = None if share >= 0.02 and self._rest.count > 1 else Severity.NOTE
-            yield self._of_rests(self._rest.found(RULES["LN204"], "bus", words, severity))
+        rests = self._remains.found(self._octets)
+        for stray in strays_found(self._senders, self._instead, self._note_if):
+            many = stray.code == "LN203" and stray.subject == BUS and self._remains.octets > OUTWEIGHED * stray.count
+            is_part = rests is not None and rests.severity >= Severity.WARNING and many
+            yield as_consequence(stray, rests, RULES) if rests is not None and is_part else stray
+        if rests is not None:
+            yield rests
+        frames = {name: one.frames for name, one in self._senders.by_name.items() if name != BUS}
+        yield from self._pieces.found(frames, MASTER)
         if self._echo.count:
             words = f"{self._echo.count} of {counted(self._asked, 'request')} came twice, the copy directly behind"
             if self._echo.count > self._asked:  # several copies of one, or of some that are still open
@@ -372,28 +382,6 @@ class LineFindings:
             often = self._echo.count >= ECHOES_LEAST and 2 * self._echo.count >= self._asked
             severity = Severity.WARNING if often else None
             yield self._echo.found(RULES["LN205"], "bus", words, severity)
-
-    def _of_rests(self, finding: Finding) -> Finding:
-        """With what the stretches that are no frame have in common."""
-        rests, line = self._rests, self._session.line
-        same, often = Counter(rests).most_common(1)[0] if rests else (b"", 0)
-        if often >= 3 and 2 * often >= len(rests):
-            words = f"{finding.seen}; the same {len(same)} octets {often} times ({same[:8].hex(' ').upper()}"
-            finding = replace(finding, seen=words + (" …)" if len(same) > 8 else ")"))
-        fit = self._other_protocol()
-        if fit is not None:
-            means = f"another protocol on the same line: {fit.means}"
-            return replace(finding, seen=f"{finding.seen}; {fit.seen}", means=means, next=_WHO_SPEAKS_IT)
-        factor = slower_by(rests, line)
-        if not factor:
-            return finding
-        rate = f"{factor} times slower, at about {line.baud // factor} Bd" if factor < 12 else "over 10 times slower"
-        return replace(
-            finding,
-            seen=f"{finding.seen}; every level in them lasts a multiple of {factor} bits: they were sent {rate}",
-            means="a device that speaks with another baud rate, by its own protocol or by a wrong setting",
-            next="which station answers so: its baud rate and protocol; two stations with one address look otherwise",
-        )
 
     def _whole(self, code: str, subject: str, words: str) -> Finding:
         return found(RULES[code], subject, words, first=self._first, last=self._now)

@@ -29,6 +29,9 @@ _DAMAGE = (
 )
 """What damage to frames is told by, in every protocol."""
 
+_DAMAGED = ("MB005", "MB006", "MB007", "MB009", "N2004", "MS401", "MS402")
+"""What tells of damaged frames whose they are, and so tells of their line errors and remains."""
+
 _ALL = (
     Rule(
         "LN001",
@@ -65,8 +68,9 @@ _ALL = (
         "LN004",
         Severity.ERROR,
         "parity set differently from the bus",
-        "Over 1 in 10 octets with a parity or framing error, whoever sends (a sender that is struck far more than the "
-        "others aside), while at least 8 in 10 octets are in good frames.",
+        "Over 1 in 10 octets of good frames with a parity or framing error (1 in 2 where one flag covers a whole "
+        "packet), whoever sends (a sender that is struck far more than the others aside), while at least 8 in 10 "
+        "octets are in good frames. Octets that are no frame do not count: those are somebody else's.",
         "the port listens with another parity than the bus has; frames get through by their check alone",
         "the parity of the bus (8E1, 8O1, 8N1, 8N2), and set it with -s",
     ),
@@ -109,6 +113,7 @@ _ALL = (
         "while the others are mostly in packets without one.",
         "noise while this station sends, weak levels from it, or two that send at once",
         "this station's connector, stub and ground; " + _WIRING,
+        told_by=_DAMAGED,
     ),
     Rule(
         "LN102",
@@ -122,10 +127,14 @@ _ALL = (
         "LN103",
         Severity.WARNING,
         "breaks",
-        "The line was held low for longer than a character. A single one is only noted. Where 8 in 10 of them are in "
-        "or directly after the frames of one station, far more than its share, that station is named.",
+        "The line was held low for longer than a character. Counted are disturbances: all within 250 ms of the first "
+        "are one. One, all within one second, or few (as in LN101) are only noted. Where at least four, and 8 in 10 "
+        "of them, begin in or directly after the frames of one station, far more than its share, that station is "
+        "named. No break is a zero octet among others that are no frame, or in a good frame: so sounds another baud "
+        "rate or format.",
         "no fail-safe bias while nobody drives the line, A and B swapped at one device, or a short circuit",
         "bias resistors at one place of the line; A and B of devices added last",
+        told_by=_DAMAGED,
     ),
     Rule(
         "LN104",
@@ -164,7 +173,8 @@ _ALL = (
         Severity.WARNING,
         "stray octets in silence",
         "One to three octets that are no frame, with silence on both sides, or anywhere, whoever sends before or "
-        "after. A single one, or fewer than 1 to 100 frames and at most two a minute, is only noted.",
+        "after. A single one, or fewer than 1 to 100 frames and at most two a minute, is only noted; so is what comes "
+        "in place of the answers of one station, at that station.",
         "the line floats when nobody drives it: no or weak fail-safe bias; or noise coupled in",
         "bias at one place of the line; the cable's way along power lines and motors",
         explains=("LN204",),
@@ -178,6 +188,7 @@ _ALL = (
         "where they are always the same, and where they were sent with a slower baud rate.",
         "damaged frames beyond recognition, another protocol on the same line, or a device with another baud rate",
         "what the stretches have in common: their place, time and first octets",
+        told_by=_DAMAGED,
     ),
     Rule(
         "LN205",
@@ -187,6 +198,17 @@ _ALL = (
         "request: a warning from three on, and half of the requests.",
         "a repeater or converter that gives back what it hears, or an adapter that hears itself",
         "the echo setting of the master's adapter or of the converter; it halves the time left on the bus",
+    ),
+    Rule(
+        "LN206",
+        Severity.WARNING,
+        "frames in pieces",
+        "Two or three rows, each of four octets or more, that are no good frame, and put together are one whose check "
+        "agrees: a pause tore it. From three on and 1 in 20 of its frames, clearly more than its share, the "
+        "sender is named; else it is only noted.",
+        "a link that delivers this sender's frames in pieces (a radio, a modem, a gateway), or firmware that pauses",
+        "the packet size and delay of the link, the firmware; whether whoever reads by silence takes such frames",
+        explains=("LN204", "LN301", "LN302", "LN303", "MB005", "MB007", "MB009", "N2004", "MS401", "MS402"),
     ),
     Rule(
         "LN301",
@@ -257,8 +279,9 @@ _ALL = (
         "LN402",
         Severity.NOTE,
         "many broadcasts",
-        "At least 30 broadcasts that make up 1 in 5 of all octets; a warning from 2 in 5 on. Every station must listen "
-        "to each of them.",
+        "At least 30 broadcasts that make up 1 in 5 of all octets and 3 in 100 of all time; a warning where it is 2 in "
+        "5 of all octets (but not nearly all: a bus that is made for broadcasts) and 15 in 100 of all time. Every "
+        "station must listen to each of them.",
         "a device or a tool that looks for others again and again, or a gateway that lets all broadcasts through",
         "who sends them (`show` with their frames) and why; what the gateway lets through",
     ),

@@ -23,6 +23,13 @@ BUSY, FULL = 0.80, 0.92
 
 BROADCASTS_LEAST = 30
 BROADCASTS_NOTED, BROADCASTS_TOO_MANY = 0.20, 0.40
+"""Of all octets."""
+
+BROADCASTS_FELT, BROADCASTS_COSTLY = 0.03, 0.15
+"""Of all time, from which on they are noted, and may be warned of: those that leave the line free cost nobody."""
+
+ONLY_BROADCASTS = 0.95
+"""Of all octets: a bus that is made for them."""
 
 
 class LineUse:
@@ -120,11 +127,11 @@ class LineUse:
                 severity=Severity.WARNING if full >= FULL else Severity.NOTE,
             )
         share = self._broadcast_busy / self._busy if self._busy else 0.0
-        if self._broadcast.count >= BROADCASTS_LEAST and share >= BROADCASTS_NOTED:
-            seconds = max(1, (self._last - (self._first or 0)) // NS_PER_S)
-            seen = (
-                f"{self._broadcast.count} broadcasts, {share:.0%} of all octets, "
-                f"{self._broadcast.count / seconds:.1f} a second"
-            )
-            severity = Severity.WARNING if share >= BROADCASTS_TOO_MANY else Severity.NOTE
-            yield self._broadcast.found(RULES["LN402"], "bus", seen, severity)
+        duration = self._last - (self._first or 0)
+        of_time = self._broadcast_busy / max(1, duration)
+        if self._broadcast.count >= BROADCASTS_LEAST and share >= BROADCASTS_NOTED and of_time >= BROADCASTS_FELT:
+            rate = self._broadcast.count / max(1, duration // NS_PER_S)
+            seen = f"{self._broadcast.count} broadcasts, {share:.0%} of all octets, {of_time:.0%} of all time"
+            is_costly = BROADCASTS_TOO_MANY <= share < ONLY_BROADCASTS and of_time >= BROADCASTS_COSTLY
+            severity = Severity.WARNING if is_costly else Severity.NOTE
+            yield self._broadcast.found(RULES["LN402"], "bus", f"{seen}, {rate:.1f} a second", severity)

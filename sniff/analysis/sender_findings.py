@@ -11,10 +11,11 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from dissectors.chances import at_least
-from dissectors.findings import Finding, Severity, Tally, counted, times
+from dissectors.findings import Finding, Severity, Tally, counted
 from dissectors.frame import Event, Frame, LineError, Mark, Noise
 from dissectors.line import Timing
 from dissectors.strikes import Strikes
+from sniff.analysis.breaks import Breaks
 from sniff.analysis.flag_runs import FlagRuns
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.shares import UNLIKELY, only_struck, standing_out
@@ -25,7 +26,13 @@ BREAKS_LEAST = 4
 NEAR = 12
 """Characters behind a frame within which a break belongs to whoever sent it."""
 
+LEVELS = frozenset((0x00, 0x80, 0xC0, 0xE0, 0xF0, 0xF8, 0xFC, 0xFE, 0xFF))
+"""Octets that one change of the level makes."""
+
 PACKETS_LEAST = 4
+ALL_STRUCK = 8
+"""Frames of one sender, all of them good and each with line errors, that no noise makes."""
+
 BUS, MASTER = "bus", "master"
 
 NoteIf = Callable[[int, int], Severity | None]
@@ -39,13 +46,14 @@ class Sender:
     frames: int = 0
     octets: int = 0
     flagged: int = 0
-    marked: int = 0  # octets with an error
+    good: int = 0  # octets in good frames
+    marked: int = 0  # of those the ones with an error
     wrong: Tally = field(default_factory=Tally)
     spoilt: Tally = field(default_factory=Tally)  # those of them that are no good frames
     at: Counter[str] = field(default_factory=Counter)  # place of the wrong octets in the frame
     stray: dict[str, Tally] = field(default_factory=dict)  # by rule
     values: Counter[tuple[str, int]] = field(default_factory=Counter)  # of those octets, by rule
-    breaks: Tally = field(default_factory=Tally)  # in its frames, or directly after one
+    breaks: Tally = field(default_factory=Tally)  # disturbances in its frames, or directly after one
 
 
 class Senders:
@@ -60,10 +68,12 @@ class Senders:
         self._end = 0  # of the frame before
         self.by_name: dict[str, Sender] = {}
         self.frames = 0
-        self.breaks = Tally()
+        self.breaks = Breaks()
         self.before: str | None = None  # who sent the frame before
         self._packet: set[str] = set()  # who sent in the packet with a flag that may go on
         self._goes_on = False
+        self._is_foreign = False  # octets that are no frame are in that packet, and may be what it is flagged for
+        self._opened = 0, 0  # time and number of its first frame
         self._flagged: Counter[frozenset[str]] = Counter()
         self._flags = Tally()
         self._struck, self._spoilt = Strikes(), Strikes()  # frames with an error; those of them that are not good
@@ -77,6 +87,10 @@ class Senders:
         """Take any row, for what its marks tell of the adapter."""
         marked = [mark.offset for mark in event.marks if mark.error & WRONG]
         self._runs.see(marked, len(event.octets), isinstance(event, Frame) and event.ok)
+        if isinstance(event, Noise) and marked:
+            if not (self._goes_on and marked[0] == 0):
+                self._close_packet()
+            self._is_foreign, self._goes_on = True, marked[-1] == len(event.octets) - 1
 
     def of(self, name: str) -> Sender:
         """A sender; one beyond the limit is not kept."""
@@ -95,7 +109,9 @@ class Senders:
         self.frames += 1
         wrong = [mark for mark in frame.marks if mark.error & WRONG]
         self._see_packet(name, no, frame, wrong)
-        sender.marked += len(wrong)
+        if frame.ok:
+            sender.good += len(frame.octets)
+            sender.marked += len(wrong)
         if name != MASTER and frame.ok:
             self._spoilt.whole()
             if not wrong:
@@ -107,8 +123,7 @@ class Senders:
         if wrong and not frame.ok:
             self._spoilt.struck(name)
             sender.spoilt.add(frame.start, no)
-        breaks = sum(bool(mark.error & LineError.BREAK) for mark in frame.marks)
-        for _ in range(min(breaks, 1) if self.packets else breaks):
+        if self.breaks.begun_by == no:
             sender.breaks.add(frame.start, no)
         self.before, self._end = name, frame.end
         return sender
@@ -120,6 +135,7 @@ class Senders:
         if sender is not None:
             sender.frames += frames
             sender.octets += octets
+            sender.good += octets
 
     def see_good(self, name: str, end: int, only_master: bool) -> None:
         """Take good frames without line errors that follow one another, which `count` has had: who sent the last of
@@ -131,11 +147,13 @@ class Senders:
         self._close_packet()
         self.before, self._end = name, end
 
-    def see_break(self, no: int, time: int, inside: bool) -> None:
-        """Take a break; those inside a frame were counted with it."""
-        self.breaks.add(time, no)
-        if not inside and self.before is not None and time - self._end <= self._near:
-            self.of(self.before).breaks.add(time, no)
+    def see_breaks(self, no: int, event: Event) -> int:
+        """Take a row with marks, before its sender is told of it; how often the line was held low in it."""
+        count = self.breaks.see(no, event)
+        is_own = count and self.breaks.begun_by == no and not isinstance(event, Frame)  # a frame is counted with it
+        if is_own and self.before is not None and event.start - self._end <= self._near:
+            self.of(self.before).breaks.add(event.start, no)
+        return count
 
     def stray(self, name: str, code: str, no: int, noise: Noise) -> None:
         """Take a few octets that are no frame."""
@@ -160,27 +178,32 @@ class Senders:
         self.of(name).flagged += 1
         if not (self._goes_on and wrong[0].offset == 0):
             self._close_packet()
-            self._flags.add(frame.start, no)
+        if not self._packet:
+            self._opened = frame.start, no
         self._packet.add(name)
         self._goes_on = wrong[-1].offset == len(frame.octets) - 1
 
     def _close_packet(self) -> None:
-        if self._packet and len(self._flagged) < MOST_SENDERS:
-            self._flagged[frozenset(self._packet)] += 1
+        if self._packet and not self._is_foreign:
+            self._flags.add(*self._opened)
+            if len(self._flagged) < MOST_SENDERS:
+                self._flagged[frozenset(self._packet)] += 1
         self._packet = set()
-        self._goes_on = False
+        self._goes_on = self._is_foreign = False
 
     # ---- judging
 
-    def are_all_struck(self, marked: int, octets: int) -> bool:
-        """Whether so many of all octets are marked as a wrong setting of the port marks: whoever sends."""
+    def are_all_struck(self) -> bool:
+        """Whether so many octets of good frames are marked as a wrong setting of the port marks: whoever sends.
+
+        Those that are no frame tell nothing: they are somebody else's, who speaks otherwise.
+        """
         many = 2 if self.packets else 10  # where one flag marks a whole packet, few errors mark many octets
-        if many * marked <= octets:
+        if not _are_many(many, self.by_name.values()):
             return False
         known = {name: one for name, one in self.by_name.items() if name != BUS}
-        out = standing_out({name: (one.marked, float(one.octets)) for name, one in known.items()}, MASTER)
-        rest = [one for name, one in known.items() if name not in out]
-        return not out or many * sum(one.marked for one in rest) > sum(one.octets for one in rest)
+        out = standing_out({name: (one.marked, float(one.good)) for name, one in known.items()}, MASTER)
+        return not out or _are_many(many, (one for name, one in known.items() if name not in out))
 
     def _wrong(self, record: Sender) -> Tally:
         """Frames with an error in them: of those in a packet with a flag, only the damaged ones surely have it."""
@@ -213,6 +236,14 @@ class Senders:
         if record.at and not self.packets:
             words += f" ({', '.join(f'{count} {place}' for place, count in record.at.most_common())})"
         finding = wrong.found(RULES["LN101"], name, words, note_if(wrong.count, record.frames))
+        if not self.packets and wrong.count == record.frames >= ALL_STRUCK and 10 * record.good >= 9 * record.octets:
+            return replace(
+                finding,
+                seen=f"{finding.seen}, though their checks agree",
+                means="this station sends with another parity, or fewer stop bits, than the port listens with",
+                next="its parity and stop bits, against those of the bus",
+                is_told_apart=True,
+            )
         if not self.packets and 4 * record.at["at the last octet"] >= 3 * sum(record.at.values()) > 8:
             finding = replace(
                 finding,
@@ -235,13 +266,16 @@ class Senders:
 
     def _of_packets(self, note_if: NoteIf) -> Finding | None:
         """The sender that is in every packet with a flag, where others are mostly in packets without one."""
-        packets = self._flagged + Counter([frozenset(self._packet)] if self._packet else [])
+        packets, flags = self._flagged, self._flags
+        if self._packet and not self._is_foreign:  # the one that may go on
+            packets, flags = packets + Counter([frozenset(self._packet)]), replace(flags, evidence=[*flags.evidence])
+            flags.add(*self._opened)
         total = packets.total()
         if total < 2:
             return None
         words = f"line errors are flagged on {counted(total, 'packet')}"
         everybody = f"{words}, whoever sends; the frames in them may be good"
-        of_bus = self._flags.found(RULES["LN101"], BUS, everybody, note_if(total, self.frames))
+        of_bus = flags.found(RULES["LN101"], BUS, everybody, note_if(total, self.frames))
         rates = {name: one.flagged / one.frames for name, one in self.by_name.items() if one.frames >= 3}
         if total < PACKETS_LEAST or not rates:
             return of_bus
@@ -255,107 +289,20 @@ class Senders:
         record = self.by_name[name]
         words += f", {within} of them with its frames: {record.flagged} of {counted(record.frames, 'frame')}, "
         words += "though their checks may agree"
-        return self._flags.found(RULES["LN101"], name, words, note_if(total, record.frames))
+        return flags.found(RULES["LN101"], name, words, note_if(total, record.frames))
 
     def breaks_found(self, note_if: NoteIf) -> Iterator[Finding]:
         """Breaks: of a sender where nearly all are in or after its frames, else of the bus."""
-        count = self.breaks.count
-        if not count:
+        if not self.breaks.events.count:
             return
+        count, severity = self.breaks.events.count, self.breaks.severity(note_if, self.frames)
         own = {name: (one.breaks.count, float(one.frames)) for name, one in self.by_name.items()}
         for name in standing_out(own):
             struck = own[name][0]
-            if struck >= max(BREAKS_LEAST, 0.8 * count) and name not in (BUS, MASTER):
-                words = f"the line was held low {times(count)}, {struck} of them in or directly after its frames"
-                finding = self.breaks.found(RULES["LN103"], name, words, note_if(count, self.frames))
-                yield replace(
-                    finding,
-                    means="this station's driver holds the line, or lets go so late or so hard that it falls",
-                    next="its turnaround, its converter's direction control, A and B at this station; then bias",
-                )
+            if severity is None and struck >= max(BREAKS_LEAST, 0.8 * count) and name not in (BUS, MASTER):
+                yield self.breaks.of_sender(name, struck)
                 return
-        words = f"the line was held low {times(count)}"
-        yield self.breaks.found(RULES["LN103"], BUS, words, note_if(count, self.frames))
-
-    def strays_found(self, note_if: NoteIf) -> Iterator[Finding]:
-        """Stray octets: of a sender that has more than its share of them, else of the bus, told once."""
-        own: list[tuple[str, str]] = []
-        common: dict[str, list[str]] = {"LN201": [], "LN202": []}
-        for code, names in common.items():
-            counts = {
-                name: (one.stray[code].count if code in one.stray else 0, float(one.frames))
-                for name, one in self.by_name.items()
-                if name != BUS
-            }
-            out = standing_out(counts, MASTER)
-            if not self.beside:  # what lies in the silence before it asks is no sign of the master
-                out.discard(MASTER)
-            own += [(name, code) for name in sorted(out)]
-            names += sorted(name for name, (count, _) in counts.items() if count and name not in out)
-            if BUS in self.by_name and code in self.by_name[BUS].stray:  # beside a frame of nobody knows whom
-                names.append(BUS)
-        silence = self.by_name[BUS].stray.get("LN203") if BUS in self.by_name else None
-        among = {code: together(self.by_name[name].stray[code] for name in names) for code, names in common.items()}
-        total = sum(tally.count for tally in among.values()) + (silence.count if silence is not None else 0)
-        for code, names in common.items():
-            alone = names[0] if len(names) == 1 else BUS
-            if code == "LN201" and alone == MASTER and not self.beside:
-                continue
-            if alone != BUS and 2 * among[code].count > total:  # nobody else is struck
-                own += [(names[0], code)]
-                total -= among.pop(code).count
-        of_own = 0
-        for name, code in own:
-            record = self.by_name[name]
-            of_own += record.stray[code].count
-            yield self._stray_finding(code, name, record.values, record.stray[code], record.frames, note_if)
-        if total:
-            found = self._of_all(among, silence, common, note_if)
-            yield replace(found, severity=Severity.NOTE) if 3 * total <= of_own else found  # most likely theirs too
-
-    def _of_all(
-        self, among: dict[str, Tally], silence: Tally | None, names: dict[str, list[str]], note_if: NoteIf
-    ) -> Finding:
-        """One finding about noise that no sender stands out by."""
-        values: Counter[tuple[str, int]] = Counter()
-        for code in among:
-            for name in names[code]:
-                values.update({key: n for key, n in self.by_name[name].values.items() if key[0] == code})
-        if silence is not None:
-            values.update({key: n for key, n in self.by_name[BUS].values.items() if key[0] == "LN203"})
-            among = {**among, "LN203": silence}
-        tally = together(among.values())
-        code = max(among, key=lambda one: among[one].count)
-        if among[code].count < 0.85 * tally.count:
-            code = "LN203"
-        values = Counter({(code, value): count for (_, value), count in values.items()})
-        parts = {"LN201": "before", "LN202": "after", "LN203": "away from"}
-        spread = ", ".join(
-            f"{among[one].count} {word}" for one, word in parts.items() if one in among and among[one].count
-        )
-        finding = self._stray_finding(code, BUS, values, tally, self.frames, note_if)
-        if sum(one.count > 0 for one in among.values()) > 1:
-            finding = replace(finding, seen=f"{finding.seen}: {spread} frames, whoever sends")
-        elif code != "LN203":
-            finding = replace(finding, seen=f"{finding.seen}, whoever sends")
-        return finding
-
-    def _stray_finding(
-        self, code: str, name: str, values: Counter[tuple[str, int]], tally: Tally, frames: int, note_if: NoteIf
-    ) -> Finding:
-        where = {"LN201": "before", "LN202": "after"}.get(code)
-        if where is None:
-            words = f"stray octets {times(tally.count)} in the silence between {counted(frames, 'frame')}"
-        elif tally.count > frames:
-            words = f"stray octets {times(tally.count)} {where} {counted(frames, 'frame')}"
-        else:
-            words = f"stray octets {where} {tally.count} of {counted(frames, 'frame')}"
-        counts = [(value, count) for (rule, value), count in values.most_common() if rule == code]
-        most = counts[:4]
-        if 2 * sum(count for _, count in most) > sum(count for _, count in counts):
-            mostly = "" if len(counts) == len(most) else "mostly "
-            words += f" ({mostly}{', '.join(f'{value:02X}' for value, _ in most)})"
-        return tally.found(RULES[code], name, words, note_if(tally.count, frames))
+        yield self.breaks.of_bus(severity)
 
 
 def together(tallies: Iterable[Tally]) -> Tally:
@@ -371,6 +318,11 @@ def together(tallies: Iterable[Tally]) -> Tally:
         whole.last = max(whole.last, tally.last)
         whole.count = count
     return whole
+
+
+def _are_many(many: int, senders: Iterable[Sender]) -> bool:
+    both = [(one.marked, one.good) for one in senders]
+    return many * sum(marked for marked, _ in both) > sum(good for _, good in both)
 
 
 def _place(frame: Frame, mark: Mark) -> str:

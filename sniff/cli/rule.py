@@ -49,6 +49,7 @@ def to_json(rule: Rule) -> dict[str, str]:
         "means": rule.means,
         "next": rule.next,
         "explains": " ".join(rule.explains),
+        "told_by": " ".join(rule.told_by),
     }
 
 
@@ -56,7 +57,9 @@ def _explained(rule: Rule) -> str:
     lines = [f"{rule.code}  {rule.title}  ({rule.severity.label} unless said otherwise)", ""]
     lines += textwrap.wrap(rule.explanation, WIDTH)
     explains = f"{', '.join(map(_codes, rule.explains))}, where it is a warning or an error" if rule.explains else ""
-    for word, text in (("consistent with", rule.means), ("check next", rule.next), ("explains", explains)):
+    told_by = f"{', '.join(map(_codes, rule.told_by))}, where one of them speaks of the same" if rule.told_by else ""
+    parts = (("consistent with", rule.means), ("check next", rule.next), ("explains", explains), ("told by", told_by))
+    for word, text in parts:
         if text:
             head = f"{word}: "
             lines += ["", *textwrap.wrap(head + text, WIDTH, subsequent_indent=" " * len(head))]

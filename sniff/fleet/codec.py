@@ -147,6 +147,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
         "cause": finding.cause,
         "stations": finding.stations,
         "is_once": finding.is_once,
+        "is_told_apart": finding.is_told_apart,
         "stated": _subject(finding.stated),
     }
 
@@ -159,6 +160,7 @@ def _finding_of(value: dict[str, Any]) -> Finding:
         cause=tuple(value["cause"]) if value["cause"] else None,
         stations=tuple(value["stations"]),
         is_once=value["is_once"],
+        is_told_apart=value["is_told_apart"],
         stated=_subject_of(value["stated"]),
     )
 

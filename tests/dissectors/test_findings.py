@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from dissectors.findings import Finding, Rule, Severity, counted, times, with_consequences
 
 RULES = {
     "XX1": Rule("XX1", Severity.ERROR, "two senders", "", explains=("XX2", "YY")),
     "XX2": Rule("XX2", Severity.WARNING, "damage", ""),
     "XX3": Rule("XX3", Severity.WARNING, "slow", ""),
+    "ZZ1": Rule("ZZ1", Severity.WARNING, "errors", "", told_by=("XX2",)),
 }
 
 
@@ -76,3 +79,25 @@ def test_words_for_counts() -> None:
     assert [times(count) for count in (1, 2, 3)] == ["once", "twice", "3 times"]
     assert [counted(count, "answer") for count in (0, 1, 2)] == ["0 answers", "1 answer", "2 answers"]
     assert counted(2, "stretch", "stretches") == "2 stretches"
+
+
+def test_one_trouble_is_told_once_by_what_tells_it_better() -> None:
+    made = after(
+        finding("ZZ1", "station 2"), finding("ZZ1", "bus"), finding("ZZ1", "station 3"), finding("XX2", "station 2")
+    )
+    for subject in ("station 2", "bus"):
+        assert made["ZZ1", subject].cause == ("XX2", "station 2")
+        assert made["ZZ1", subject].means == "most likely the same trouble as XX2 (station 2: damage)"
+    assert made["ZZ1", "station 3"].cause is None
+
+
+def test_the_trouble_of_the_bus_is_not_one_of_two_stations() -> None:
+    made = after(finding("ZZ1", "bus"), finding("XX2", "station 2"), finding("XX2", "station 3"))
+    assert made["ZZ1", "bus"].severity is Severity.WARNING
+
+
+def test_what_names_its_own_cause_and_what_is_told_by_a_mere_consequence_stand_for_themselves() -> None:
+    apart = replace(finding("ZZ1", "bus"), is_told_apart=True)
+    assert after(apart, finding("XX2", "bus"))["ZZ1", "bus"] == apart
+    made = after(finding("ZZ1", "bus"), finding("XX2", "bus"), finding("XX1", "bus"))
+    assert (made["ZZ1", "bus"].cause, made["XX2", "bus"].cause) == (None, ("XX1", "bus"))

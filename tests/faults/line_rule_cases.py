@@ -11,8 +11,16 @@ from dissectors.simulated_faults import Break, MarkParity, NoiseInGaps
 from sniff.simulation.tap import FTDI
 from tests.faults.buses import modbus, n2
 from tests.faults.case import Case
-from tests.faults.line_faults import Anywhere, AtTimes, as_protocol, by_other_uart, masked, paused, with_settings
-from tests.faults.stations import Dies, Of
+from tests.faults.line_faults import (
+    Anywhere,
+    AtTimes,
+    as_protocol,
+    by_other_uart,
+    masked,
+    paused,
+    with_settings,
+)
+from tests.faults.stations import Dies, Of, Pauses
 
 MS = 1_000_000
 S = 1_000_000_000
@@ -57,6 +65,11 @@ LINE_RULE_CASES: tuple[Case, ...] = (
         FTDI,
     ),
     Case("line, breaks of one station", partial(modbus, (Of("unit 2", Break(0.1)),)), (("LN103", "station 2"),)),
+    Case(
+        "line, one station in pieces",
+        partial(modbus, (Of("unit 2", Pauses(1.0, 40 * MS)),), pause=100 * MS),
+        (("LN206", "station 2"),),
+    ),
     Case("line, noise anywhere", partial(_five, (NoiseInGaps(0.1),)), (("LN203", "bus"),)),
     Case(
         "line, ringing after everybody",

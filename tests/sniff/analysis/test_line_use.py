@@ -57,6 +57,12 @@ def test_broadcasts(share: float, severity: Severity | None) -> None:
     assert (found.severity if found is not None else None) is severity
 
 
+def test_broadcasts_that_leave_the_line_free_are_nobodys_trouble() -> None:
+    assert used([0.1] * 60, 0.2) == {}
+    (made_for_them,) = used([0.4] * 60, 1.0).values()
+    assert made_for_them.severity is Severity.NOTE
+
+
 @pytest.mark.parametrize("tap", [EXACT, FTDI], ids=lambda tap: tap.name)
 def test_of_usual_buses_nothing_is_said(tap) -> None:  # type: ignore[no-untyped-def]
     for make in (modbus, n2, mstp):

@@ -1,0 +1,97 @@
+"""Octets that are no frame, in longer stretches: how many, and what else they may be. Pure, bounded."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+from dissectors.findings import Finding, Severity, Tally, counted
+from dissectors.frame import Chunk, Noise
+from sniff.analysis.line_rules import LINE_RULES as RULES
+from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, other_protocol
+from sniff.analysis.slower_bus import slower_by
+from sniff.engine.session import Session
+
+MOST_KEPT: Final = 16
+"""Stretches that are asked what they may be."""
+
+MORE_THAN_REMAINS: Final = 0.3
+"""Of all octets; so much is no mere remains of somebody's damaged frames."""
+
+_WHO_SPEAKS_IT: Final = (
+    "which device still speaks the other protocol: its protocol setting; it does not belong on this line"
+)
+
+
+class Remains:
+    """Fed such stretches. `octets`: how many in all."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._tally = Tally()
+        self.octets = 0
+        self._first: list[bytes] = []
+        self._sample: list[Chunk] = []  # the same, to ask what else they may be
+        self._sampled = 0
+        self._fit: tuple[int, Fit | None] = (0, None)  # asked when so many octets were sampled
+
+    def add(self, no: int, noise: Noise) -> None:
+        """Take the next one."""
+        self._tally.add(noise.start, no)
+        self.octets += len(noise.octets)
+        if len(self._first) < MOST_KEPT and len(noise.octets) <= 300:
+            self._first.append(noise.octets)
+        if self._sampled < SAMPLE_OCTETS:
+            self._sample.append(Chunk(noise.end, noise.octets[:SAMPLE_OCTETS], noise.marks))
+            self._sampled += len(noise.octets)
+
+    def take_back(self, newest: Sequence[int]) -> None:
+        """Count the newest ones no more, of so many octets each: they are pieces of a frame."""
+        self._tally.count -= len(newest)
+        self.octets -= sum(newest)
+
+    def found(self, of_all: int) -> Finding | None:
+        """What there is to say so far. `of_all`: octets that were heard."""
+        if not self._tally.count:
+            return None
+        share = self.octets / of_all
+        stretches = counted(self._tally.count, "stretch", "stretches")
+        words = f"{self.octets} octets in {stretches} are no frame, {share:.1%} of all"
+        severity = None if share >= 0.02 and self._tally.count > 1 else Severity.NOTE
+        finding = self._told(self._tally.found(RULES["LN204"], "bus", words, severity))
+        return replace(finding, is_told_apart=True) if share >= MORE_THAN_REMAINS else finding
+
+    def _told(self, finding: Finding) -> Finding:
+        """With what the stretches have in common."""
+        rests, line = self._first, self._session.line
+        same, often = Counter(rests).most_common(1)[0] if rests else (b"", 0)
+        if often >= 3 and 2 * often >= len(rests):
+            words = f"{finding.seen}; the same {len(same)} octets {often} times ({same[:8].hex(' ').upper()}"
+            finding = replace(finding, seen=words + (" …)" if len(same) > 8 else ")"))
+        fit = self._other_protocol()
+        if fit is not None:
+            means = f"another protocol on the same line: {fit.means}"
+            seen = f"{finding.seen}; {fit.seen}"
+            return replace(finding, seen=seen, means=means, next=_WHO_SPEAKS_IT, is_told_apart=True)
+        factor = slower_by(rests, line)
+        if not factor:
+            return finding
+        rate = f"{factor} times slower, at about {line.baud // factor} Bd" if factor < 12 else "over 10 times slower"
+        return replace(
+            finding,
+            seen=f"{finding.seen}; every level in them lasts a multiple of {factor} bits: they were sent {rate}",
+            means="a device that speaks with another baud rate, by its own protocol or by a wrong setting",
+            next="which station answers so: its baud rate and protocol; two stations with one address look otherwise",
+            is_told_apart=True,
+        )
+
+    def _other_protocol(self) -> Fit | None:
+        """What the stretches are; asked again when there are twice as many octets."""
+        asked, fit = self._fit
+        if self._sampled >= 2 * asked or (asked < self._sampled >= SAMPLE_OCTETS):
+            session = self._session
+            fit = other_protocol(self._sample, session.line, session.adapter.latency, session.protocol)
+            self._fit = self._sampled, fit
+        return fit
