@@ -264,7 +264,7 @@ _ALL = (
         "many there less than once in ten. A warning where they came back.",
         "something they share: a supply, a fuse, a stretch of cable, a repeater",
         "what these stations have in common: supply, cabinet, the piece of cable behind the last one that answers",
-        explains=("MB001", "MB002", "MB003", "MB104", "MB105", "N2005", "N2010"),
+        explains=("MB001", "MB002", "MB003", "MB020", "MB104", "MB105", "N2005", "N2010", "N2015"),
     ),
     Rule(
         "LN401",

@@ -17,7 +17,7 @@ _ALL = (
         "error where a bus did not come back.",
         "what all buses share failed: the supply of the plant or of a cabinet, one controller with all of them on it",
         "supply, fuses and the controller's log at that moment; the single buses are most likely well",
-        explains=("LN304", "LN305", "MB001", "MB002", "MB003", "MB104", "MB105", "N2005", "N2010"),
+        explains=("LN304", "LN305", "MB001", "MB002", "MB003", "MB020", "MB104", "MB105", "N2005", "N2010", "N2015"),
     ),
     Rule(
         "SB002",
