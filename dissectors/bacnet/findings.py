@@ -10,8 +10,8 @@ from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_hearing import TRUSTED, hasty, hearing, takes_unheard, unheard_share
 from dissectors.bacnet.findings_of_refusals import REFUSED_KEPT, Refusals
 from dissectors.bacnet.findings_of_use import polls, use
-from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
-from dissectors.bacnet.ring import COARSE_LIMIT, Ring, RingEventKind, RingNode, lies_between
+from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_ALL_SILENT, T_REPLY_DELAY, T_USAGE_DELAY
+from dissectors.bacnet.ring import COARSE_LIMIT, Happened, Ring, RingEventKind, RingNode, lies_between
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.bacnet.rules import RULES
 from dissectors.findings import Finding, Severity, as_consequence, counted, times
@@ -120,8 +120,7 @@ def _tokens(ring: Ring) -> Iterable[Remark]:
         if what is RingEventKind.LOST_TOKEN:
             longest = max((event.value or 0 for event in happened.events), default=0)
             makers = sorted({event.other for event in happened.events if event.other is not None})
-            disturbed = "who had it is not known, or octets that are no good frame came first"
-            held = disturbed if mac is None else f"MAC {mac} had it"
+            held = f"MAC {mac} had it" if mac is not None else _unheld(happened)
             grave = None if mac is not None else Severity.WARNING if happened.count > 1 else Severity.NOTE
             seen = (
                 f"the token was lost {times(happened.count)}; {held}; silence up to {measured(longest)}; "
@@ -151,6 +150,17 @@ def _tokens(ring: Ring) -> Iterable[Remark]:
     for mac, node in ring.nodes.items():
         if node.polls_sent > ALONE_POLLS and not node.tokens_sent and not node.tokens_received:
             yield plain("MS109", ring, mac, f"{counted(node.polls_sent, 'poll')} for masters and not one token")
+
+
+def _unheld(happened: Happened) -> str:
+    """Why no station is named for lost tokens."""
+    of_all = sum((event.value or 0) >= T_ALL_SILENT for event in happened.events)
+    all_silent = (
+        f"all stations were silent together, longer than {measured(T_ALL_SILENT)}, which no master that is alive "
+        "leaves: their supply, the line or the tap"
+    )
+    disturbed = "who had it is not known, or octets that are no good frame came first"
+    return all_silent if of_all == len(happened.events) else f"{disturbed}; or {all_silent}" if of_all else disturbed
 
 
 def _holders(ring: Ring) -> Iterable[Remark]:

@@ -6,6 +6,7 @@ from dissectors.line import MS as MS
 
 T_NO_TOKEN = 500 * MS  # silence after which the token counts as lost
 T_SLOT = 10 * MS  # back-off slot, times the node's own address, before it makes a new token
+T_ALL_SILENT = 2_000 * MS  # T_NO_TOKEN and a slot for each address, and some: no master that is alive waits so long
 T_REPLY_DELAY = 250 * MS  # a node must answer a request, or postpone, within
 T_REPLY_TIMEOUT = 255 * MS  # shortest wait of the one who asked (255 … 300)
 T_REPLY_TIMEOUT_MAX = 300 * MS

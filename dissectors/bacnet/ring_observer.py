@@ -18,6 +18,7 @@ from dissectors.bacnet.limits import (
     BROADCAST,
     MAX_MASTER,
     N_MIN_OCTETS,
+    T_ALL_SILENT,
     T_NO_TOKEN,
     T_USAGE_DELAY,
     T_USAGE_TIMEOUT,
@@ -283,8 +284,11 @@ class MstpRingObserver:
         elif frame.octets[2] in _ANSWERS:  # somebody had the token and asked
             tally.note(RingEventKind.UNHEARD, frame.start, no, frame.octets[3], source)
         elif tally.edges:  # where no token was ever seen, none can be lost
-            holder = None if self._doubt or self._was_interrupted() else self._holder
-            tally.note(RingEventKind.LOST_TOKEN, frame.start, no, holder, source, self._silence(frame))
+            silence = self._silence(frame)
+            # so long a silence has no master alive in it: what all of them share failed, or the tap, and no holder
+            unknown = self._doubt or self._was_interrupted() or silence >= T_ALL_SILENT
+            holder = None if unknown else self._holder
+            tally.note(RingEventKind.LOST_TOKEN, frame.start, no, holder, source, silence)
             begin_search(tally.node(source), frame.start)
         self._forget()
 

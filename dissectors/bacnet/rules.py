@@ -15,9 +15,9 @@ _ALL = (
         Severity.ERROR,
         "lost token",
         "Nothing was sent for 500 ms (Tno_token) and then a station began anew: the token was lost "
-        "(ASHRAE 135, 9.5.6). The one with the lowest address begins first, 10 ms (Tslot) per address later. "
-        "Only where "
-        "tokens are in the capture.",
+        "(ASHRAE 135, 9.5.6). The one with the lowest address begins first, 10 ms (Tslot) per address later, so that "
+        "2 s of silence are of all stations together, and nobody is named for them. Only where tokens are in the "
+        "capture.",
         "the station that had the token was reset, switched off or disturbed while it passed the token on",
         "power and wiring of the last holder; noise at that moment; whether it answers Test Request",
         explains=("MS102", "MS105", "MS106", "MS201"),

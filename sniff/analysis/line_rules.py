@@ -254,6 +254,7 @@ _ALL = (
         "or the adapter was away.",
         "the master stopped: a restart, a busy controller, a changeover, a program that was loaded",
         "the master's log and watchdog at that time",
+        explains=("MS101",),
     ),
     Rule(
         "LN305",

@@ -9,7 +9,7 @@ from dissectors.line import LineSettings
 from dissectors.modbus.simulated_master import write_register
 from dissectors.simulated_faults import Break, MarkParity, NoiseInGaps
 from sniff.simulation.tap import FTDI
-from tests.faults.buses import modbus, n2
+from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case
 from tests.faults.line_faults import (
     Anywhere,
@@ -20,6 +20,7 @@ from tests.faults.line_faults import (
     paused,
     with_settings,
 )
+from tests.faults.profibus_cases import profibus
 from tests.faults.stations import Dies, Of, Pauses
 
 MS = 1_000_000
@@ -40,6 +41,17 @@ LINE_RULE_CASES: tuple[Case, ...] = (
         struck=("station 1", "station 2", "station 3"),
     ),
     Case("line, silent for a while", modbus, (("LN304", "bus"),), hear=partial(paused, ((20.0, 12.0),)), seconds=40),
+    Case(
+        "line, silent for a while, MS/TP", mstp, (("LN304", "bus"),), hear=partial(paused, ((20.0, 12.0),)), seconds=40
+    ),
+    Case("line, silent for a while, N2", n2, (("LN304", "bus"),), hear=partial(paused, ((20.0, 12.0),)), seconds=40),
+    Case(
+        "line, silent for a while, PROFIBUS",
+        profibus,
+        (("LN304", "bus"),),
+        hear=partial(paused, ((5.0, 12.0),)),
+        seconds=20,
+    ),
     Case(
         "line, stations lost at one moment",
         partial(_five, change={2: partial(Dies, at=20 * S), 3: partial(Dies, at=20 * S), 5: partial(Dies, at=20 * S)}),
