@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from dissectors.frame import Frame
+from dissectors.profiles.brief_words import say_briefly
 from dissectors.profiles.decoding import Value, brief_title, decode, number, said_title, say
 from dissectors.profiles.model import Entry, Profile
 from dissectors.profiles.properties import due_property
@@ -86,6 +87,14 @@ class Meaning:
         if self.profile is None:
             return ""
         return self.refused or say(self.profile, self.readings) or self._question()
+
+    def briefly(self, room: int) -> str:
+        """What `about` says, in `room` characters where leaving out makes it fit."""
+        said = self.about
+        if len(said) <= room or self.profile is None or self.refused or not self.readings:
+            return said
+        device = f"{self.who}: " if self.station is None else ""
+        return device + (say_briefly(self.profile, self.readings, room - len(device)) or self._question())
 
     def _question(self) -> str:
         """ "read status, fault, output frequency"; what the profile does not know is left out."""

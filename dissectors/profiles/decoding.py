@@ -102,14 +102,18 @@ def decode(profile: Profile | None, readings: Sequence[Reading]) -> tuple[Value,
 
 def say(profile: Profile | None, readings: Sequence[Reading]) -> str:
     """What an exchange says: "run, reverse", "frequency command 60.00 Hz"; empty when the profile knows nothing."""
-    said: list[str] = []
+    return joined([text for _, text in phrases(profile, readings)])
+
+
+def phrases(profile: Profile | None, readings: Sequence[Reading]) -> Iterable[tuple[Value, str]]:
+    """The values that an exchange tells, each in words with its name."""
     for value in decode(profile, readings):
         if value.entry is not None and not value.bit and not value.says_nothing:
-            said.append(phrase(value))
+            yield value, phrase(value)
         elif value.reading.part and profile is not None:
             about = profile.at(value.reading.space, value.reading.address)
-            said += [_attribute_phrase(value, about)] if about is not None and not about.reserved else []
-    return _joined(said)
+            if about is not None and not about.reserved:
+                yield value, _attribute_phrase(value, about)
 
 
 def phrase(value: Value) -> str:
@@ -194,11 +198,18 @@ def _code_words(entry: Entry, value: int) -> str:
 
 def bit_words(entry: Entry, raw: int) -> str:
     """What the bits of a register say; empty when it has no named bits."""
-    words = [bit.on if raw >> bit.number & 1 else bit.off for bit in entry.bits]
-    words += [part.states.get(part.of(raw), f"{part.name} {part.of(raw)}") for part in entry.parts]
-    words += [f"reserved bit {bit:X}" for bit in entry.reserved_in(raw)]
-    said = ", ".join(word for word in words if word)
+    said = ", ".join(words for words, _ in each_bit(entry, raw))
     return said or (NO_BITS if entry.bits or entry.parts else "")
+
+
+def each_bit(entry: Entry, raw: int) -> list[tuple[str, EntryRole]]:
+    """What each of the bits says, and whether that is a fault or a warning; without those that say nothing."""
+    ons = [(bit, raw >> bit.number & 1) for bit in entry.bits]
+    words = [(bit.on, bit.role) if on else (bit.off, EntryRole.VALUE) for bit, on in ons]
+    held = [(part, part.of(raw)) for part in entry.parts]
+    words += [(part.states.get(at, f"{part.name} {at}"), part.roles.get(at, EntryRole.VALUE)) for part, at in held]
+    words += [(f"reserved bit {bit:X}", EntryRole.VALUE) for bit in entry.reserved_in(raw)]
+    return [one for one in words if one[0]]
 
 
 def _plain(reading: Reading) -> Value:
@@ -287,7 +298,8 @@ def in_range(entry: Entry, value: int | float | str) -> bool:
     return not ((entry.low is not None and value < entry.low) or (entry.high is not None and value > entry.high))
 
 
-def _joined(phrases: Sequence[str]) -> str:
-    more = len(phrases) - MOST_WORDS
-    shown = phrases[:MOST_WORDS]
+def joined(said: Sequence[str]) -> str:
+    """All of it in one line of words."""
+    more = len(said) - MOST_WORDS
+    shown = said[:MOST_WORDS]
     return "; ".join(shown) + (f"; +{more}" if more > 0 else "")

@@ -24,6 +24,15 @@ def describe(dissector: Dissector, row: Row, meaning: Meaning | None = None) -> 
     return dissector.line(event, row.header, role if role is not Role.UNKNOWN else row.header.role, meaning)
 
 
+def describe_briefly(dissector: Dissector, row: Row, meaning: Meaning | None, room: int) -> str:
+    """The same where a line has `room` characters: less of what the row means, so that its numbers are seen."""
+    text, about = describe(dissector, row, meaning), "" if meaning is None else meaning.about
+    before, found, behind = text.partition(about) if about else (text, "", "")
+    if meaning is None or not found or len(before) + len(about) <= room:
+        return text
+    return before + meaning.briefly(room - len(before)) + behind
+
+
 def describe_noise(noise: Noise) -> str:
     """One line about octets that are no frame."""
     where = "between frames" if noise.place is Place.BETWEEN else f"{noise.place.value} a frame"

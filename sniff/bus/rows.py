@@ -30,7 +30,7 @@ from sniff.analysis.points import PointTable
 from sniff.analysis.polls import Polls
 from sniff.analysis.site_ear import SiteEar
 from sniff.analysis.summary import Summary
-from sniff.analysis.wording import describe
+from sniff.analysis.wording import describe, describe_briefly
 from sniff.bus.ascending import Ascending
 from sniff.bus.kept_tables import KeptTables
 from sniff.bus.model import BusModel
@@ -375,6 +375,10 @@ class Store:
     def text(self, row: Row) -> str:
         """One line that says what a row is, and what that means to its device."""
         return describe(self.dissector, row, self.meaning(row))
+
+    def brief_text(self, row: Row, room: int) -> str:
+        """The same in `room` cells, where leaving out some of what it means makes it fit."""
+        return describe_briefly(self.dissector, row, self.meaning(row), room)
 
     def meaning(self, row: Row) -> Meaning | None:
         """What is known of a row besides its octets."""

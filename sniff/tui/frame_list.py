@@ -113,7 +113,7 @@ class FrameList(StoreList):
         foreign = self.viewing.foreign
         found = () if foreign is None else foreign.of(row.no)
         if foreign is None or not found:
-            return self.store.text(row)
+            return self.brief_text(row, self.width_of("text") + 1 + self.width_of("verdict"))
         return f"{foreign.second.name}: " + "; ".join(describe(foreign.second, one, None) for one in found)
 
     def _verdict(self, transaction: Transaction | None, text: str) -> Cell:

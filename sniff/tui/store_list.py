@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 from sniff.bus.rows import Store
+from sniff.engine.engine import Row
 from sniff.tui.columns import Column, chosen, lay_out
 from sniff.tui.linelist import LineList
 from sniff.tui.times import TimeMode, clock, seconds
@@ -49,6 +50,10 @@ class StoreList(LineList):
     def width_of(self, name: str) -> int:
         """Cells that a column has now."""
         return next((column.width for column in self.columns if column.name == name), 0)
+
+    def brief_text(self, row: Row, room: int) -> str:
+        """What a row says and means, with less of it where `room` cells are too few; all of it once it is scrolled."""
+        return self.store.text(row) if self.shifted else self.store.brief_text(row, room)
 
     def time_text(self, start: int, before: int | None) -> str:
         """A time in the way the user counts; `before`: when the line above began, None at the top."""

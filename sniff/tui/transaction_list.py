@@ -72,7 +72,9 @@ class TransactionList(StoreList):
         response = transaction.response
         if self.width_of("kind") < LINE and response is not None and self.store.told(response):
             rows.reverse()  # values first: both do not fit
-        parts = [sanitized(self.store.text(row)) for row in rows if row is not None] or [sanitized(transaction.kind)]
+        room = self.width_of("kind")
+        parts = [sanitized(self.brief_text(row, room)) for row in rows if row is not None]
+        parts = parts or [sanitized(transaction.kind)]
         error = sanitized(transaction.error or "")
         if error and not any(error in part for part in parts):
             parts.append(error)
