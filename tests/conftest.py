@@ -15,7 +15,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 SLOW = [HealthCheck.too_slow]
-settings.register_profile("suite", max_examples=40, deadline=None, derandomize=True, suppress_health_check=SLOW)
+settings.register_profile("suite", max_examples=25, deadline=None, derandomize=True, suppress_health_check=SLOW)
 settings.register_profile("thorough", max_examples=1000, deadline=None, suppress_health_check=SLOW)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
 

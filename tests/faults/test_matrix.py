@@ -95,7 +95,7 @@ def unless_pending(case: Case) -> None:
         pytest.skip("pending: no rule tells this yet")
 
 
-@pytest.mark.parametrize("case", some(FAULTY, 2), ids=lambda case: case.name)
+@pytest.mark.parametrize("case", some(FAULTY, 3), ids=lambda case: case.name)
 def test_what_is_wrong_is_found_where_it_is_and_nobody_else_is_accused(case: Case) -> None:
     unless_pending(case)
     outcome = run(case, seed=1)

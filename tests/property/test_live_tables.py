@@ -81,7 +81,7 @@ def _batch(dice: random.Random, most: int) -> int:
 
 
 @pytest.mark.parametrize(
-    "path", some([path for path in NAMES if path.stat().st_size < HUGE], 4), ids=lambda path: path.name
+    "path", some([path for path in NAMES if path.stat().st_size < HUGE], 6), ids=lambda path: path.name
 )
 def test_a_capture_gives_the_same_live(path: Path) -> None:
     try:

@@ -56,7 +56,7 @@ class Given:
     by_tables: list[Table | LineEvent]
 
 
-@pytest.fixture(scope="module", params=some(NAMES, 2), ids=lambda path: path.name)
+@pytest.fixture(scope="module", params=some(NAMES, 3), ids=lambda path: path.name)
 def given(request: pytest.FixtureRequest) -> Given:
     """A capture, read once for all that is asked of it."""
     try:
