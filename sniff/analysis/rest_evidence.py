@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from dissectors import registry
-from dissectors.frame import Chunk
-from dissectors.line import NS_PER_S, LineSettings
+from dissectors.frame import Chunk, Event, Frame
+from dissectors.framer import Framer
+from dissectors.line import NS_PER_S, LineSettings, Timing
 from sniff.analysis.autodetect import CandidateEvidence
 from sniff.engine.session import Session
 
 SECOND_FRAMES = 2
 SECOND_BITS = 40.0
 """Evidence from which on octets that are no frames of the first protocol are taken for frames of a second one."""
+
+LATER = 10 * NS_PER_S
+"""After so long a silence no protocol waits for more."""
 
 
 def second_in(
@@ -22,12 +26,29 @@ def second_in(
     none has evidence enough (bits)."""
     found: list[tuple[float, str, int]] = []
     for name in others if rest else ():
-        line = LineSettings.parse(registry.get(name).default_line) if session.line_is_assumed else session.line
+        dissector = registry.get(name)
+        line = LineSettings.parse(dissector.default_line) if session.line_is_assumed else session.line
+        if not _has_frames(rest, dissector.framer(Timing(line, session.adapter.latency))):
+            continue
         evidence = CandidateEvidence(line, (name,), session.adapter.latency)
         for chunk in rest:
             evidence.feed(chunk)
-        evidence.advance(rest[-1].time + 10 * NS_PER_S)
+        evidence.advance(rest[-1].time + LATER)
         tally = evidence.tallies[name]
         if tally.frames >= SECOND_FRAMES and tally.bits >= enough:
             found.append((tally.bits, name, tally.frames))
     return max(found)[1:] if found else None
+
+
+def _has_frames(rest: Sequence[Chunk], framer: Framer) -> bool:
+    """Whether there are good frames enough to look closer: noise, which most of it is, has hardly any."""
+    good = 0
+    for chunk in rest:
+        good += _good(framer.feed(chunk))
+        if good >= SECOND_FRAMES:
+            return True
+    return good + _good(framer.advance(rest[-1].time + LATER)) >= SECOND_FRAMES
+
+
+def _good(events: Sequence[Event]) -> int:
+    return sum(isinstance(event, Frame) and event.ok for event in events)
