@@ -65,7 +65,7 @@ class Meaning:
 
     `station`: whose values they are, None for all stations; `request`: what it answers, None where it is no answer or
     nobody heard the question. `refused`: the maker's words for the exception code that it carries. `asked`: the places
-    that a request speaks of without a value (`dissectors.readings.Asks`).
+    that a request speaks of without a value (`dissectors.readings.Asks`). `written`: what an answer confirms.
     """
 
     station: int | None
@@ -74,6 +74,7 @@ class Meaning:
     refused: str = ""
     request: Frame | None = None
     asked: tuple[Reading, ...] = ()
+    written: tuple[Reading, ...] = ()
 
     @property
     def who(self) -> str:
@@ -86,7 +87,7 @@ class Meaning:
         """What it says in one line: "status running, forward; output current 12.3 A"; empty without a profile."""
         if self.profile is None:
             return ""
-        return self.refused or say(self.profile, self.readings) or self._question()
+        return self.refused or say(self.profile, self.readings) or self._question() or self._confirmation()
 
     def briefly(self, room: int) -> str:
         """What `about` says, in `room` characters where leaving out makes it fit."""
@@ -98,10 +99,19 @@ class Meaning:
 
     def _question(self) -> str:
         """ "read status, fault, output frequency"; what the profile does not know is left out."""
+        titles = self._titles(self.asked)
+        return f"{self.asked[0].words or 'read'} {titles}" if titles else ""
+
+    def _confirmation(self) -> str:
+        """ "frequency command acknowledged": an answer that repeats nothing of what it confirms but where that is."""
+        titles = self._titles(self.written)
+        return f"{titles} acknowledged" if titles else ""
+
+    def _titles(self, readings: tuple[Reading, ...]) -> str:
         if self.profile is None:
             return ""
         titles: list[str] = []
-        for one, more in _runs(self.profile, self.asked):
+        for one, more in _runs(self.profile, readings):
             entry = self.profile.at(one.space, one.address)
             if entry is not None and more is not None:
                 titles.append(f"{entry.title.removesuffix(f' {entry.name}')}s {entry.name} … {more.name}")
@@ -111,7 +121,7 @@ class Meaning:
                 title = brief_title(entry) if entry is not None else f"{one.space} {one.address}"
                 part = f" {one.part.replace('.', ' ')}" if one.part else ""
                 titles.append(title + part + (" (this device has none)" if lacks else ""))
-        return f"{self.asked[0].words or 'read'} {', '.join(dict.fromkeys(titles))}" if titles else ""
+        return ", ".join(dict.fromkeys(titles))
 
     def questions(self, place: PlaceName) -> Iterator[tuple[str, str]]:
         """The places that are asked for, each with what is there."""

@@ -185,10 +185,12 @@ def meaning_of(dissector: Dissector, devices: Devices, row: Row, request: Frame 
     `request`."""
     event, placement = row.event, row.placement
     take = dissector.readings
+    written: tuple[Reading, ...] = ()
     if take is None or placement is None or not isinstance(event, Frame) or not event.ok:
         return None
     if placement.role is Role.RESPONSE:
         station, readings = placement.source, take(request, event) if request is not None else ()
+        written = tuple(reading for reading in readings if reading.how is Origin.WRITE)
         readings = tuple(reading for reading in readings if reading.how is not Origin.WRITE)
     else:
         station, readings, request = placement.destination, take(event, None), None
@@ -196,10 +198,10 @@ def meaning_of(dissector: Dissector, devices: Devices, row: Row, request: Frame 
     asked: tuple[Reading, ...] = ()
     if not readings and placement.role is Role.REQUEST and dissector.asks is not None:
         asked = dissector.asks(event)
-    for one in (*readings[:1], *asked[:1]):
+    for one in (*readings[:1], *written[:1], *asked[:1]):
         station = station if one.station is None else one.station
     profile = devices.at(station)
     refusal = dissector.refusal
     refused = refusal(event) if profile is not None and refusal is not None and not readings else None
     words = profile.exception(*refused) if profile is not None and refused is not None else ""
-    return Meaning(station, profile, readings, words, request, asked)
+    return Meaning(station, profile, readings, words, request, asked, written)

@@ -115,7 +115,7 @@ def test_words_of_rows() -> None:
         devices=Devices({1: E510}, None),
     )
     assert said[0] == "drive 1: run, reverse"
-    assert said[1] == ""  # an answer to a write repeats it
+    assert said[1] == "drive 1: operation command acknowledged"
     assert "drive 1: status stopped, forward, not ready, fault; fault external fault 01" in said
     assert "drive 1: request refused (code of the manual's example, not in its table)" in said
     assert said[-1] == ""  # no profile for station 7
