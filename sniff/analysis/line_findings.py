@@ -9,7 +9,7 @@ from functools import cache
 from typing import NamedTuple
 
 from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, found, times
-from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Noise, Place, Reason, Role
+from dissectors.frame import Chunk, Damage, Event, Flaw, Frame, LineError, Noise, Place, Reason, Role
 from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction, Verdict
@@ -35,6 +35,9 @@ STRAY_MOST = 3
 
 OUTWEIGHED = 20
 """So many octets in longer stretches for each stray one, and the strays are theirs."""
+
+MENDED_LEAST = 3
+"""So many frames that are good but for one and the same thing are a system, and prove the settings as good ones do."""
 
 ECHOES_LEAST = 3
 """Echoes from which on a repeater or converter is likely, where half of the requests have one."""
@@ -79,6 +82,7 @@ class LineFindings:
         adapter = session.adapter
         self._senders = Senders(session.timing, adapter.packets)
         self._octets = self._in_frames = self._marked = self._low = self._rows = self._frames = self._good = 0
+        self._mended: dict[Flaw, tuple[int, int]] = {}  # frames, and octets of them, that are good but for that
         self._first = self._now = 0
         self._damaged = self._damaged_here = 0  # rows that are no good frame, and those of them with an overrun
         self._overruns, self._lost = Tally(), Tally()
@@ -192,6 +196,9 @@ class LineFindings:
         if frame.ok:
             self._good += 1
             self._in_frames += len(frame.octets)
+        elif frame.repair is not None:
+            frames, octets = self._mended.get(frame.repair.flaw, (0, 0))
+            self._mended[frame.repair.flaw] = frames + 1, octets + len(frame.octets)
         self._senders.see(sender, row.no, frame)
         if frame.ok:
             self._pieces.forget()
@@ -263,7 +270,9 @@ class LineFindings:
     @property
     def heard(self) -> Heard:
         """What was on the line so far."""
-        heard = Heard(self._octets, self._in_frames, self._rows, self._good, bool(self._only_heard))
+        mended = [one for one in self._mended.values() if one[0] >= MENDED_LEAST]
+        good, in_frames = (own + sum(one[at] for one in mended) for at, own in enumerate((self._good, self._in_frames)))
+        heard = Heard(self._octets, in_frames, self._rows, good, bool(self._only_heard))
         return replace(heard, is_told=True) if heard.is_strange and self._other_settings() is not None else heard
 
     def judgement(self) -> Judgement:

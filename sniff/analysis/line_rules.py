@@ -55,7 +55,8 @@ _ALL = (
         Severity.ERROR,
         "hardly anything is a frame",
         "Under 3 in 10 octets, and under 3 in 10 of all frames and other stretches, are good frames; of at least 60 "
-        "octets, or 40 where it is known what they are. Not where 20 frames or more are good, "
+        "octets, or 40 where it is known what they are. Frames that are good but for one thing, the same three times "
+        "or more, count as good: the rules of the protocol name it. Not where 20 frames or more are good, "
         "with 1 in 10 octets in them: they prove the settings (LN204). All other rules are left out then: they would "
         "judge rubbish. What fits is named: another protocol whose checks agree, seven bits read as "
         "eight, data bits that the port "

@@ -40,6 +40,13 @@ def swapped_check(request: bytes, answer: bytes) -> bytes:
     return answer[:-2] + answer[-1:] + answer[-2:-1]
 
 
+class SwapsChecks(Wrapped):
+    """A master that sends the high octet of the CRC first."""
+
+    def wake(self, now: int) -> tuple[Send, ...]:
+        return tuple(replace(send, octets=swapped_check(b"", send.octets)) for send in super().wake(now))
+
+
 def other_check(request: bytes, answer: bytes) -> bytes:
     """The CRC begun with 0 and not with FFFF."""
     check = 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 from dissectors.frame import Place
@@ -16,6 +17,7 @@ from tests.faults.hearing import echoing, hidden_latency, noisy_tap, of_party, s
 from tests.faults.misbehaving import (
     Rewrites,
     SpoiltFirst,
+    SwapsChecks,
     TakesReadsOnly,
     Trimmed,
     Unhurried,
@@ -89,6 +91,13 @@ MODBUS_CASES: tuple[Case, ...] = (
         partial(modbus, change={2: partial(Rewrites, rewrite=swapped_check)}),
         (Said(_second, words=_SWAP),),
         FTDI,
+    ),
+    Case(
+        "RTU CRC octets swapped by the master",
+        replace(_turns, change_master=SwapsChecks),
+        (("MB011", "master"),),
+        never=("LN003",),
+        seeds=1,
     ),
     Case(
         "RTU first octet of one station lost",
