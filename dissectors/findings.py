@@ -224,6 +224,16 @@ class Tally:
         )
 
 
+def together(tallies: Iterable[Tally]) -> Tally:
+    """Several tallies as one; of their frames the first EVIDENCE_MAX."""
+    seen = [one for one in tallies if one.count]
+    if not seen:
+        return Tally()
+    frames = sorted({no for one in seen for no in one.evidence})
+    first, last = min(one.first for one in seen), max(one.last for one in seen)
+    return Tally(sum(one.count for one in seen), first, last, frames[:EVIDENCE_MAX])
+
+
 def with_consequences(findings: Iterable[Finding], rules: Mapping[str, Rule]) -> tuple[Finding, ...]:
     """The same findings; those that a graver or as grave one explains (`Rule.explains`) are notes that name it.
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dissectors.columns import ROLES
-from dissectors.frame import Role
+from dissectors.columns import FOUNDS, ROLES
+from dissectors.frame import FoundBy, Role
 from dissectors.modbus.gaps import SPACING_KEPT, Gaps, sender_name
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from dissectors.line import Timing
     from dissectors.row_columns import RowColumns
 
+_JOINED = FOUNDS.index(FoundBy.JOINED)
 _REQUEST, _RESPONSE = ROLES.index(Role.REQUEST), ROLES.index(Role.RESPONSE)
 
 
@@ -66,10 +67,11 @@ def see_spacing(gaps: Gaps, rows: RowColumns, said: Silences, stretch: slice) ->
     who = np.where(rows.placed.role[stretch] == _RESPONSE, rows.placed.source[stretch].astype(np.int64), 0)
     if int(inside.max()) > gaps.pause_limit:
         start, length = rows.frames.start[stretch].tolist(), rows.frames.length[stretch].tolist()
-        every = zip(who.tolist(), inside.tolist(), spacing.tolist(), start, length, strict=True)
-        for no, (sender, silence, of_octet, began, size) in enumerate(every, rows.first + stretch.start):
+        torn = (rows.frames.found[stretch] == _JOINED).tolist()
+        every = zip(who.tolist(), inside.tolist(), spacing.tolist(), start, length, torn, strict=True)
+        for no, (sender, silence, of_octet, began, size, is_torn) in enumerate(every, rows.first + stretch.start):
             if silence > gaps.pause_limit:
-                gaps.see_pause(no, began, size, silence, sender_name(sender))
+                gaps.see_pause(no, began, size, silence, sender_name(sender), is_torn=is_torn)
             gaps.spacing_of(sender_name(sender)).append(of_octet)
         return
     order = np.argsort(who.astype(np.int16), kind="stable")

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dissectors.findings import Tally
-from dissectors.frame import Frame, Header, Role
+from dissectors.frame import FoundBy, Frame, Header, Role
 from dissectors.line import Timing
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.envelope import RTU_NAME
@@ -105,13 +105,15 @@ class Gaps:
             return
         silence = frame.end - frame.slack - frame.start - length * self._char
         if silence > self.pause_limit:
-            self.see_pause(no, frame.start, length, silence, sender)
+            self.see_pause(no, frame.start, length, silence, sender, is_torn=frame.found is FoundBy.JOINED)
         self.spacing_of(sender).append(silence // (length - 1))
 
-    def see_pause(self, no: int, start: int, length: int, silence: int, sender: str) -> None:
-        """Take a frame with more silence in it than the rule allows."""
+    def see_pause(self, no: int, start: int, length: int, silence: int, sender: str, *, is_torn: bool) -> None:
+        """Take a frame with more silence in it than the rule allows. `is_torn`: so much of it stands at one place that
+        the framer had to put the frame together, which no even spacing does."""
         usual = self.spacing_of(sender)
-        if len(usual) >= SPACING_LEAST and silence - (length - 1) * max(0, middle(usual)) > self.pause_limit:
+        is_uneven = len(usual) >= SPACING_LEAST and silence - (length - 1) * max(0, middle(usual)) > self.pause_limit
+        if is_torn or is_uneven:
             self.seen.gap_tally(self.seen.paused, sender).add(start, no)
 
     def spacing_of(self, sender: str) -> deque[int]:

@@ -254,7 +254,8 @@ _ALL = (
         Severity.WARNING,
         "requests damaged here alone",
         "Requests that arrive damaged at this tap and are answered all the same, more of them than of those that are "
-        "not answered. A note where there are few, or answers are damaged as well.",
+        "not answered. A note where there are few, or answers are damaged as well. Under it stands what a station "
+        "leaves unanswered (MB002), where that is no more.",
         "noise at this tap, or a signal of the master too weak here; where it was heard worse still, the answers seem "
         "to come unasked",
         "this tap's place, its ground and its wires to the line; whether the master's reads fail at all",
@@ -413,7 +414,8 @@ _ALL = (
         "frames too close together",
         "Less than 3.5 characters of silence between two good RTU frames (Modbus over Serial Line V1.02, 2.5.1.1; "
         "1.75 ms above 19200 Bd), even by the longest reading that the adapter leaves. At least three, and 1 in 10 of "
-        "the sender's frames; not of answers that came too late.",
+        "the sender's frames; not of answers that came too late. A note about the bus where all its stations, two or "
+        "more, do so.",
         "strict receivers take the two for one frame and drop both",
         "the response delay of the station, or the pause of the master",
     ),
@@ -423,7 +425,8 @@ _ALL = (
         "pauses inside frames",
         "More than 1.5 characters of silence inside a good RTU frame (Modbus over Serial Line V1.02, 2.5.1.1), even by "
         "the shortest reading that the adapter leaves, and beyond the even spacing of octets that the sender shows in "
-        "most of its frames. At least three, and only where the adapter's delay is at most a fifth of 1.5 characters.",
+        "most of its frames, or 3.5 characters of it at one place. At least three, and only where the adapter's delay "
+        "is at most a fifth of 1.5 characters.",
         "a sender that cannot keep its transmitter fed: an interrupted program, a USB adapter, a radio link",
         "strict receivers drop such frames; use a sender with a FIFO or a lower baud rate",
     ),

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from dissectors.findings import Finding, Severity, Tally, counted, found, times
+from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, found, times, together
 from dissectors.late_speakers import MASTER, NOBODY, Heard, late_speakers, told
 from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
@@ -20,6 +20,7 @@ _WASTE = 0.05
 _HABIT = 10  # a sender that is too quick is so once in so many frames at least; what a computer holds up is rarer
 _HABIT_LEAST = 6
 _PAUSES_LEAST = 3
+_CLOSE_LEAST = 3
 _BARE_LEAST = 3
 _MASTERS_LEAST = 3
 _CUT_LEAST = 3
@@ -42,7 +43,7 @@ def judge(seen: BusRecord, timeout: int | None) -> tuple[Finding, ...]:
         if unit not in unheard:
             made += of_missing(seen, unit, station, unit in scanned)
         made += of_station(seen, unit, station, timeout, f"station {unit}" not in damage.blamed)
-    return tuple(made)
+    return tuple(_lost_alike(made, seen.damaged_here.count))
 
 
 # ---- the bus
@@ -78,13 +79,7 @@ def _of_bus(seen: BusRecord, is_blamed: bool, scanned: list[int], unheard: list[
         share = waited / seen.span
         words = f"{share:.0%} of the time ({duration(waited)}) went into waiting for {units(absent)}"
         severity = Severity.WARNING if share > _WASTE else None
-        first = min(station.missing.first for station in absent.values())
-        last = max(station.missing.last for station in absent.values())
-        count = sum(station.missing.count for station in absent.values())
-        evidence = tuple(sorted(no for station in absent.values() for no in station.missing.evidence))
-        yield found(
-            RULES["MB105"], "bus", words, first=first, last=last, count=count, evidence=evidence, severity=severity
-        )
+        yield together(one.missing for one in absent.values()).found(RULES["MB105"], "bus", words, severity)
     broadcast = seen.answers_to_broadcast
     if broadcast.count or seen.noise_after_broadcast.count >= 3:
         tally = broadcast if broadcast.count else seen.noise_after_broadcast
@@ -117,6 +112,15 @@ def _damaged_here(seen: BusRecord, requests: int) -> Iterator[Finding]:
         words = f"{damaged.count} of {counted(requests, 'request')} damaged here, and answered all the same"
         rare = seen.rare(damaged.count, requests) or 4 * others > damaged.count
         yield damaged.found(RULES["MB022"], "bus", words, note_if(rare))
+
+
+def _lost_alike(made: Sequence[Finding], damaged_here: int) -> Iterator[Finding]:
+    """The findings; where requests arrive damaged here, a station that leaves out no more than that may have got as
+    many of them damaged: the loss is under that finding."""
+    cause = next((one for one in made if one.code == "MB022" and one.severity >= Severity.WARNING), None)
+    for one in made:
+        is_alike = cause is not None and one.code == "MB002" and one.count <= damaged_here
+        yield as_consequence(one, cause, RULES) if cause is not None and is_alike else one
 
 
 def _cut_by_master(seen: BusRecord) -> Iterator[Finding]:
@@ -240,14 +244,7 @@ def _crossed(seen: BusRecord) -> Iterator[Finding]:
 
 def _of_gaps(seen: BusRecord) -> Iterator[Finding]:
     timing = seen.timing
-    for sender, calls in sorted(seen.close.items()):
-        tally = Tally()
-        for time, before, no in calls:
-            if before not in seen.late_frames and no not in seen.late_frames:
-                tally.add(time, before, no)
-        if tally.count >= 3 and _HABIT * tally.count >= seen.frames[sender]:
-            words = f"{tally.count} frames began less than {fine_milliseconds(timing.t35)} after the frame before"
-            yield tally.found(RULES["MB301"], sender, words)
+    yield from _too_close(seen)
     paused = seen.paused if seen.judges_pauses else {}
     hits = {sender: tally.count for sender, tally in paused.items()}
     blamed = to_blame(hits, {sender: max(1, seen.frames[sender]) for sender in hits}) if len(hits) > 1 else set(hits)
@@ -271,6 +268,27 @@ def _of_gaps(seen: BusRecord) -> Iterator[Finding]:
         yield found(RULES["MB303"], "adapter", words, first=seen.first or 0, last=seen.now)
 
 
+def _too_close(seen: BusRecord) -> Iterator[Finding]:
+    """Frames directly behind others: of those whose habit it is; where all stations do so, so speaks this bus."""
+    habits: dict[str, Tally] = {}
+    for sender, calls in sorted(seen.close.items()):
+        tally = Tally()
+        for time, before, no in calls:
+            if before not in seen.late_frames and no not in seen.late_frames:
+                tally.add(time, before, no)
+        if tally.count >= _CLOSE_LEAST and _HABIT * tally.count >= seen.frames[sender]:
+            habits[sender] = tally
+    limit = fine_milliseconds(seen.timing.t35)
+    if len(habits) > 1 and seen.frames.keys() - habits.keys() <= {MASTER}:
+        among = together(habits.values())
+        words = f"{among.count} frames began less than {limit} after the frame before, whoever sends"
+        yield among.found(RULES["MB301"], "bus", words, Severity.NOTE)
+        return
+    for sender, tally in habits.items():
+        words = f"{tally.count} frames began less than {limit} after the frame before"
+        yield tally.found(RULES["MB301"], sender, words)
+
+
 def _of_ends(seen: BusRecord) -> Iterator[Finding]:
     """Frames without LF: of those who leave it out while others send it; where all do, it is how this bus speaks."""
     habits = {
@@ -279,14 +297,9 @@ def _of_ends(seen: BusRecord) -> Iterator[Finding]:
         if tally.count >= _BARE_LEAST and _HABIT * tally.count >= seen.frames[sender]
     }
     if len(habits) > 1 and len(habits) == len(seen.frames):
-        count = sum(tally.count for tally in habits.values())
-        words = f"{counted(count, 'frame')} end with CR alone, whoever sends"
-        evidence = tuple(sorted(no for tally in habits.values() for no in tally.evidence))
-        first, last = min(one.first for one in habits.values()), max(one.last for one in habits.values())
-        severity = Severity.NOTE
-        yield found(
-            RULES["MB019"], "bus", words, first=first, last=last, count=count, evidence=evidence, severity=severity
-        )
+        among = together(habits.values())
+        words = f"{counted(among.count, 'frame')} end with CR alone, whoever sends"
+        yield among.found(RULES["MB019"], "bus", words, Severity.NOTE)
         return
     for sender, tally in habits.items():
         words = f"{tally.count} of {counted(seen.frames[sender], 'frame')} end with CR alone"
@@ -301,19 +314,14 @@ def _common_damage(seen: BusRecord, damage: DamageShare) -> list[Finding]:
         return []
     asked = sum(seen.stations[unit].asked for unit in struck)
     answers = damaged - hits.get("master", 0)
-    tally = Tally()
-    for unit in struck:
-        for no in seen.stations[unit].damaged.evidence:
-            tally.add(seen.stations[unit].damaged.first, no)
+    tally = together(seen.stations[unit].damaged for unit in struck)
     words = f"{answers} of {counted(asked, 'answer')} damaged ({answers / max(1, asked):.1%}), of {units(struck)}"
     if "master" in hits:
         words += f", and {counted(hits['master'], 'request')}"
     words += (
         ": of each about as much as it sends" if len(hits) > 1 else ": too few, and too close together, to say whose"
     )
-    finding = tally.found(RULES["MB007"], "bus", words, note_if(seen.rare(damaged, asked)))
-    last = max(seen.stations[unit].damaged.last for unit in struck)
-    return [replace(finding, count=answers, last=last)]
+    return [replace(tally.found(RULES["MB007"], "bus", words, note_if(seen.rare(damaged, asked))), count=answers)]
 
 
 def _of_late_speakers(seen: BusRecord) -> Iterator[Finding]:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
-from dissectors.findings import Finding, Severity, Tally, counted
+from dissectors.findings import Finding, Severity, counted, together
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.finding_words import note_if, units
 from dissectors.modbus.rules import RULES
@@ -28,10 +27,4 @@ def of_unheard(seen: BusRecord, unheard: Sequence[int]) -> Iterator[Finding]:
             "after an answer, neither waiting nor asking again"
         )
         severity = note_if(seen.rare(count, asked))
-    tally = Tally()
-    for one in stations:
-        for no in one.missing.evidence:
-            tally.add(one.missing.first, no)
-    finding = tally.found(RULES["MB020"], "bus", words, severity)
-    last = max(one.missing.last for one in stations)
-    yield replace(finding, count=count, first=min(one.missing.first for one in stations), last=last)
+    yield together(one.missing for one in stations).found(RULES["MB020"], "bus", words, severity)

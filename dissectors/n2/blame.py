@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from math import sqrt
 from typing import Final
 
-from dissectors.findings import Tally
+from dissectors.findings import Tally, together
 from dissectors.n2.record import Damages
 from dissectors.strikes import Strikes
 
@@ -47,14 +47,3 @@ def _outstanding(senders: Mapping[str, Damages], strikes: Strikes) -> str | None
         if mine > OUTSTANDING * due and mine > due + 3 * sqrt(due):
             worst = max(worst or (0.0, ""), (mine / due, name))
     return worst[1] if worst is not None else None
-
-
-def together(tallies: Collection[Tally]) -> Tally:
-    """Several tallies as one; there must be one."""
-    both = Tally(
-        sum(one.count for one in tallies),
-        min(one.first for one in tallies),
-        max(one.last for one in tallies),
-    )
-    both.evidence = sorted({frame for one in tallies for frame in one.evidence})
-    return both

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from dissectors.findings import Finding, Severity, Tally, counted, times
+from dissectors.findings import Finding, Severity, Tally, counted, times, together
 from dissectors.frame import Flaw
 from dissectors.line import MS, NS_PER_S
-from dissectors.n2.blame import blamed, together
+from dissectors.n2.blame import blamed
 from dissectors.n2.commands import error_name
 from dissectors.n2.objects import attribute_name, number, object_name
 from dissectors.n2.record import Damages, N2StationRecord

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from dissectors.chances import at_least
-from dissectors.findings import Finding, Severity, Tally, counted
+from dissectors.findings import Finding, Severity, Tally, counted, together
 from dissectors.frame import Event, Frame, LineError, Mark, Noise
 from dissectors.line import Timing
 from dissectors.strikes import Strikes
@@ -303,21 +303,6 @@ class Senders:
                 yield self.breaks.of_sender(name, struck)
                 return
         yield self.breaks.of_bus(severity)
-
-
-def together(tallies: Iterable[Tally]) -> Tally:
-    """All of them as one."""
-    whole = Tally()
-    for tally in tallies:
-        if not tally.count:
-            continue
-        count = whole.count + tally.count
-        for no in tally.evidence:
-            whole.add(tally.first, no)
-        whole.first = min(whole.first, tally.first) if whole.count else tally.first
-        whole.last = max(whole.last, tally.last)
-        whole.count = count
-    return whole
 
 
 def _are_many(many: int, senders: Iterable[Sender]) -> bool:

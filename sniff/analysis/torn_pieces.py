@@ -11,13 +11,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Final
 
-from dissectors.findings import Finding, Severity, Tally, counted
+from dissectors.findings import Finding, Severity, Tally, counted, together
 from dissectors.frame import Chunk, Frame
 from dissectors.framer import Framer
 from dissectors.line import Timing
 from dissectors.manifest import Dissector
 from sniff.analysis.line_rules import LINE_RULES as RULES
-from sniff.analysis.sender_findings import BUS, together
+from sniff.analysis.sender_findings import BUS
 from sniff.analysis.shares import standing_out
 
 PIECES: Final = 8

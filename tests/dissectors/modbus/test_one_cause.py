@@ -149,6 +149,35 @@ def test_requests_that_only_this_tap_hears_damaged_explain_answers_unasked(bus):
     assert graves_of(bus) == {("MB022", "bus")}
 
 
+def lossy_and_damaged_here(bus, lost):
+    """Requests to station 1 that only this tap hears damaged; `lost` requests to station 2 stay without an answer."""
+    for turn in range(12):
+        polls(bus.damage(read(1), 40).say(values(1, turn), 8), 3)
+        for _ in range(lost):
+            polls(bus.say(read(2)).exchange(read(1), values(1), pause=250), 1)
+    return bus
+
+
+def test_requests_damaged_here_explain_as_few_that_are_left_unanswered(bus):
+    assert graves_of(lossy_and_damaged_here(bus, 1)) == {("MB022", "bus")}
+    assert any(one.cause == ("MB022", "bus") for one in findings_of(bus) if one.code == "MB002")
+
+
+def test_requests_damaged_here_do_not_explain_more_losses_than_that(bus):
+    assert ("MB002", "station 2") in graves_of(lossy_and_damaged_here(bus, 2))
+
+
+@pytest.mark.parametrize(
+    ("took", "said"),
+    [((1.0, 1.0), {("MB301", "bus", Severity.NOTE)}), ((1.0, 8.0), {("MB301", "station 1", Severity.WARNING)})],
+)
+def test_where_all_stations_answer_too_soon_it_is_how_this_bus_speaks(bus, took, said):
+    for _ in range(6):
+        for unit, after in zip((1, 2), took, strict=True):
+            bus.exchange(read(unit), values(unit), after)
+    assert {(one.code, one.subject, one.severity) for one in findings_of(bus) if one.code == "MB301"} == said
+
+
 # ---- times
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
-from dissectors.frame import Frame
+from dissectors.frame import FoundBy, Frame
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.header import peek_rtu
 from dissectors.modbus.observer import ModbusFindings
@@ -41,3 +42,16 @@ def test_pauses_are_judged_where_the_adapter_is_quick_enough(
     codes = {finding.code for finding in judge.findings()}
     assert ("MB302" in codes) is judged
     assert ("MB303" in codes) is not judged
+
+
+@pytest.mark.parametrize(("found", "is_said"), [(FoundBy.JOINED, True), (FoundBy.GAP, False)])
+def test_a_sender_that_always_pauses_at_one_place_is_told_from_even_spacing(
+    frame_of: Callable[..., Frame], found: FoundBy, is_said: bool
+) -> None:
+    timing = Timing(LineSettings.parse("9600,8N1"), 0)
+    judge = ModbusFindings(timing)
+    for no in range(1, 21):
+        now = no * 200 * MS
+        frame = replace(frame_of(READ, start=now, end=now + 8 * timing.char + 8 * MS), found=found)
+        judge.see(no, frame, peek_rtu(frame), Placement(no, no, peek_rtu(frame).role, None, 1))
+    assert any(finding.code == "MB302" for finding in judge.findings()) is is_said
