@@ -25,6 +25,7 @@ class AskedRequest:
     frame: Frame
     header: Header
     octets: bytes
+    is_behind_silence: bool = False  # a long one: what could be an answer may be one
 
     @property
     def unit(self) -> int:

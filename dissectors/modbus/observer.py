@@ -17,6 +17,7 @@ from dissectors.modbus.envelope import RTU_NAME, readable_adu, rtu_check
 from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.functions import BROADCAST, COPIED, EXCEPTION_BIT, FUNCTIONS, answer_length
 from dissectors.modbus.learned_timing import READ
+from dissectors.modbus.long_silences import SILENCE_LEAST
 from dissectors.modbus.pairing import is_answer
 from dissectors.modbus.remembered import (
     BEGIN,
@@ -57,11 +58,15 @@ class ModbusFindings(Remembered):
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
         """See `dissectors.findings.Judge`."""
         seen = self.seen
+        gap = event.start - seen.now
         seen.first = event.start if seen.first is None else seen.first
         seen.now = max(seen.now, event.end)
         if self._is_cut_echo(event):
             seen.cut_echoes.add(event.start, no)
             return
+        is_behind_silence = gap >= SILENCE_LEAST and self.silences.is_one(gap)
+        if is_behind_silence:
+            self._see_silence(gap, placement)
         tx = self.newest if placement is None or header is None else placement.tx
         self.torn.see(no, event, tx, is_good_frame=header is not None and header.ok)
         if isinstance(event, Noise) or header is None or placement is None:
@@ -85,7 +90,7 @@ class ModbusFindings(Remembered):
             self.open = self.broadcast = None
         else:
             self.newest = placement.tx
-            self._see_request(AskedRequest(no, event, header, octets), placement)
+            self._see_request(AskedRequest(no, event, header, octets, is_behind_silence), placement)
         if header.ok and octets and octets[0] > LAST_STANDARD_UNIT:
             self.station(octets[0]).reserved.add(event.start, no)
 
@@ -187,6 +192,16 @@ class ModbusFindings(Remembered):
         return judge(self.seen, self.learnt.timeout)
 
     # ---- rows
+
+    def _see_silence(self, gap: int, placement: Placement | None) -> None:
+        """A long silence before a row: what was given up in it as not answered may have been."""
+        asked = self.open
+        is_answer = placement is not None and placement.tx == self.newest
+        if asked is None or is_answer or not self.silences.note(asked.no, gap):
+            return
+        for tx, lost in list(self.lost.items()):
+            if lost.no == asked.no:
+                self.station(lost.unit).withdraw(self.lost.pop(tx))
 
     def _see_request(self, asked: AskedRequest, placement: Placement) -> None:
         if len(self.asked) < OPEN_KEPT:
@@ -357,6 +372,10 @@ class ModbusFindings(Remembered):
             del self.elsewhere[asked.no]  # the pair is reported instead
             self.seen.repeated_elsewhere[asked.unit] += transaction.attempt > 1
             return
+        if verdict is Verdict.NO_RESPONSE:
+            may_be_answer = asked.is_behind_silence and asked.header.role is not Role.REQUEST
+            if may_be_answer or self.silences.hide_answer_to(asked.no):
+                return
         if asked.fault is not None:
             self.seen.malformed.add(transaction.start, transaction.request, transaction.response)
             if len(self.seen.malformed_words) < _WORDS_KEPT:

@@ -11,6 +11,7 @@ from dissectors.modbus.bare_ends import BareEnds
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.gaps import Gaps
 from dissectors.modbus.learned_timing import LearnedTiming
+from dissectors.modbus.long_silences import LongSilences
 from dissectors.modbus.station_record import Lost, StationRecord
 from dissectors.modbus.torn import TornFrames
 
@@ -40,6 +41,7 @@ class Remembered:
         self.seen = BusRecord(timing)
         self.gaps = Gaps(timing, self.seen, self.learnt)
         self.ends = BareEnds(timing, self.seen)
+        self.silences = LongSilences(self.learnt)
         self.asked: dict[int, AskedRequest] = {}  # by transaction
         self.open: AskedRequest | None = None  # the newest request, while nothing has come after it
         self.broadcast: AskedRequest | None = None  # likewise

@@ -278,6 +278,16 @@ class StationRecord:
                 if lost.no in tally.evidence:
                     tally.evidence.remove(lost.no)
 
+    def withdraw(self, lost: Lost) -> None:
+        """Whether the request was answered cannot be known: it counts as not asked."""
+        self.forgive(lost)
+        self.asked -= 1
+        self.silent.count = max(0, self.silent.count - 1)
+        request = self.requests.get(lost.key)
+        if request is not None:
+            request.tries -= 1
+            request.turns -= request.turns > 0
+
     def heard(self, time: int) -> None:
         """Something came from it."""
         self.last_heard = time

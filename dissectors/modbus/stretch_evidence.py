@@ -12,6 +12,7 @@ from dissectors.frame import Frame
 from dissectors.modbus.asked import AskedRequest
 from dissectors.modbus.exchange_columns import SAMPLES
 from dissectors.modbus.learned_timing import READ
+from dissectors.modbus.long_silences import SILENCE_LEAST
 from dissectors.modbus.regular_exchanges import REFUSED, TO_ALL, UNANSWERED
 from dissectors.modbus.remembered import BEGIN, LAST_STANDARD_UNIT, OPEN_KEPT, SLOW_UNLEARNT, slow_limit
 from dissectors.modbus.response_groups import AnsweredRequest, SameRequest
@@ -265,8 +266,11 @@ class StretchEvidence:
         """A request that nothing answered until the next one."""
         one, judge = self._exchanged, self._judge
         self._settle(before)
-        asked = one.asked(before)
-        judge.waited_in_vain(asked, one.asked(at))
+        asked, following = one.asked(before), one.asked(at)
+        gap = following.frame.start - asked.frame.end
+        if gap >= SILENCE_LEAST:
+            judge.silences.note(asked.no, gap)
+        judge.waited_in_vain(asked, following)
         judge.settle_request(judge.station(one.unit[before]), one.transaction(before), asked, None, b"")
         self._learn_timeout()
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from dissectors import stretches
@@ -40,6 +42,20 @@ def test_what_is_remembered_is_the_same_wherever_tables_are_cut(seed: int, is_as
 @pytest.mark.parametrize("trouble", TROUBLES)
 def test_each_trouble_alone_leaves_the_same(trouble: str) -> None:
     session, reads = bus(99, trouble == "bare", exchanges=300, troubles=(trouble,))
+    made = [one for one in tables([Block(reads)], session) if isinstance(one, Table)]
+    by_rows, by_columns = BulkModbusFindings(session.timing), BulkModbusFindings(session.timing)
+    for table in made:
+        in_turn(by_rows, table)
+        by_columns.take(table)
+    assert memory(by_columns) == memory(by_rows)
+    assert by_columns.findings() == by_rows.findings()
+
+
+@pytest.mark.parametrize("trouble", ["silent", "repeat", "unasked"])
+def test_long_silences_anywhere_leave_the_same(trouble: str) -> None:
+    session, reads = bus(5, exchanges=300, troubles=(trouble,))
+    part = np.arange(len(reads)) // 40
+    reads = replace(reads, times=reads.times + part * (part + 1) * 2_000_000_000)  # 4, 8, 12 … s
     made = [one for one in tables([Block(reads)], session) if isinstance(one, Table)]
     by_rows, by_columns = BulkModbusFindings(session.timing), BulkModbusFindings(session.timing)
     for table in made:
