@@ -220,7 +220,7 @@ class LineFindings:
                 name, code = stray.told(sender)
                 self._senders.stray(name, code, stray.no, stray.noise)
                 self._count_instead(code == "LN203", stray.asked)
-            if sender == self._asker:
+            if self._asker is not None and sender in (self._asker, BUS):  # as in `_Stray.told`
                 self._count_instead(self._awaited, self._called_last)
             self._begins.forget()
             self._pending.clear()

@@ -45,3 +45,21 @@ def test_what_is_left_of_an_answer_is_nobodys(left: bytes) -> None:
 
 def test_octets_after_a_poll_that_is_answered_are_the_masters() -> None:
     assert accused(b"\xfe", ANSWER) == {("LN202", "master")}
+
+
+def test_what_is_left_of_a_write_that_may_be_repeated_is_in_place_of_its_answer() -> None:
+    write = seal_rtu(bytes.fromhex("030600030005"))
+    other = seal_rtu(bytes.fromhex("050300000001")), seal_rtu(bytes.fromhex("0503020007"))
+    session = Session("x", LINE, "modbus-rtu", adapter=Adapter())
+    now, chunks = 10**9, []
+    for turn in range(24):
+        left = ((b"\x03", 25), (write, 190)) if turn % 8 == 0 else ()
+        said = (POLL, 40), (ANSWER, 25), (other[0], 40), (other[1], 25), (write, 40), *left, (write, 25)
+        for octets, gap in said:
+            now += gap * MS
+            chunks.append(Chunk(now, octets))
+    judging = Judging(session, dissector_for(session))
+    for output in outputs(chunks, session):
+        assert isinstance(output, Output)
+        judging.add(output)
+    assert [one.subject for one in judging.findings() if one.code == "LN203"] == ["station 3"]
