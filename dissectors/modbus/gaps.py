@@ -7,7 +7,7 @@ the computer was busy, and had caught up when the next request came.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from dissectors.findings import Tally
@@ -48,6 +48,8 @@ class Gaps:
         self.before: Frame | None = None  # the row before, if it was a good frame
         self.answered: Frame | None = None  # the row before, if it was a good answer
         self.spacing: dict[str, deque[int]] = {}  # silence an octet of the last frames of each sender, ns
+        self.asked: int | None = None  # when the request of that answer began, if it was the row before it
+        self._asks: int | None = None  # when the row before began, if it was a good request
         self._slow: deque[_Slow] = deque()  # answers that took long, until the pause after them is known
         self.pauses: deque[int] = deque(maxlen=SPACING_KEPT)  # the master's, between an answer and its next request
         self.hurried: deque[int] = deque(maxlen=64)  # answers after which the master seemed to pause hardly
@@ -58,10 +60,12 @@ class Gaps:
         self._see_pause_before(no, frame, header, placement)
         self.before = frame if header.ok else None
         self.answered = frame if placement.role is Role.RESPONSE and header.ok else None
+        self.asked = self._asks if self.answered is not None else None
+        self._asks = frame.start if placement.role is Role.REQUEST and header.ok else None
 
     def hear_noise(self) -> None:
         """Take octets that are no frame."""
-        self.before = self.answered = None
+        self.before = self.answered = self.asked = self._asks = None
 
     def took_long(self, tally: Tally, transaction: Transaction) -> None:
         """Count an answer that took long, once the pause after it is known."""
@@ -73,9 +77,10 @@ class Gaps:
         while len(self._slow) > left:
             self._judge_slow(self._slow.popleft())
 
-    def pass_by(self, last: Frame) -> None:
-        """Go on behind good frames, of which `last` is the last one, and an answer."""
+    def pass_by(self, last: Frame, asked: int) -> None:
+        """Go on behind good frames, of which `last` is the last one, and an answer; its request began at `asked`."""
         self.before = self.answered = last
+        self.asked, self._asks = asked, None
 
     def begins_soon(self, start: int, octets: bytes) -> bool:
         """Whether a good frame begins too soon after the row before; frames that touch came in one read, which says
@@ -136,15 +141,17 @@ class Gaps:
         pause = max(0, frame.start - self.answered.end)
         if self.is_hurried(pause, self.pauses):
             self.hurried.append(no - 1)
-        self.paused((pause,))
+        turns = () if self.asked is None else ((frame.start - self.asked, self.answered.end - self.asked),)
+        self.paused((pause,), turns)
 
     def is_hurried(self, pause: int, before: Sequence[int]) -> bool:
         """Whether a pause is far below the usual of those before."""
         return len(before) >= SPACING_LEAST and 2 * pause < middle(before) - self.latency
 
-    def paused(self, pauses: Sequence[int]) -> None:
-        """The master's next pauses between an answer and a request, ns."""
+    def paused(self, pauses: Sequence[int], turns: Iterable[tuple[int, int]]) -> None:
+        """The master's next pauses between an answer and a request, ns; `turns`: see `BusRecord.turns`."""
         self.pauses.extend(pauses)
+        self.seen.turns.extend(turns)
         for pause in pauses[-PAUSES_KEPT:]:
             self._learnt.paused(pause, 0)
 

@@ -16,7 +16,7 @@ from dissectors.columns import ROLES
 from dissectors.frame import Frame, Role
 from dissectors.line import MS
 from dissectors.modbus.envelope import RTU_NAME
-from dissectors.modbus.gap_columns import hurried, see_close, see_spacing, silences
+from dissectors.modbus.gap_columns import hurried, see_close, see_spacing, silences, turns_before
 from dissectors.modbus.gaps import sender_name
 from dissectors.modbus.observer import ModbusFindings
 from dissectors.modbus.regular_exchanges import UNANSWERED, adus_of, regular
@@ -68,13 +68,14 @@ class _Judging:
         stretch = slice(exchanged.request[begin], exchanged.last[end - 1] + 1)
         self._count(stretch, which)
         pause_rows, pauses = self._see_gaps(stretch)
-        self._evidence.go_through(begin, end, pause_rows, pauses, hurried(judge.gaps, pauses))
+        turns = turns_before(judge.gaps, rows, pause_rows, stretch.start)
+        self._evidence.go_through(begin, end, pause_rows, pauses, turns, hurried(judge.gaps, pauses))
         closed = exchanged.closed
         judge.repeats.extend(closed.id[which][closed.attempt[which] > 1].tolist())
         self._keep_answers(begin, end)
         last = rows.row(stretch.stop - 1)
         assert isinstance(last.event, Frame)
-        judge.gaps.pass_by(last.event)
+        judge.gaps.pass_by(last.event, int(rows.frames.start[stretch.stop - 2]))
         judge.torn.see(last.no, last.event, None, is_good_frame=True)
         judge.newest = int(closed.id[end - 1])
 

@@ -233,7 +233,8 @@ _ALL = (
         "answers not heard here",
         "Requests that nothing followed here, after which the master went on as it does after an answer: no later than "
         "answers and its usual pauses take, and, four times in five, without asking again. Or, then an error, requests "
-        "to two stations or more of which none is ever heard and none is asked again.",
+        "to two stations or more of which none is ever heard and none is asked again. Not where the master sends by "
+        "the clock, however long answers take.",
         "answers that this tap does not hear: a signal too weak here, a four-wire line of which this pair carries the "
         "master alone, reads that the recording lost; or stations that are off, and a master that sends by the clock",
         "whether the master has their values; tap near those stations, and on both pairs of a four-wire line",

@@ -10,6 +10,7 @@ import numpy as np
 
 from dissectors.frame import Frame
 from dissectors.modbus.asked import AskedRequest
+from dissectors.modbus.bus_record import TURNS_KEPT
 from dissectors.modbus.exchange_columns import SAMPLES
 from dissectors.modbus.learned_timing import READ
 from dissectors.modbus.long_silences import SILENCE_LEAST
@@ -20,7 +21,7 @@ from dissectors.modbus.station_record import Key, Requested, StationRecord
 from dissectors.tracker import Interval, Transaction
 
 if TYPE_CHECKING:
-    from dissectors.columns import TransactionColumns
+    from dissectors.columns import Times, TransactionColumns
     from dissectors.modbus.observer import ModbusFindings
     from dissectors.modbus.regular_exchanges import Adus, Regular
     from dissectors.row_columns import RowColumns
@@ -152,13 +153,23 @@ class StretchEvidence:
         self._compared: list[_Request] = []
         self._pause_rows: list[int] = []
         self._pauses: list[int] = []
+        self._turns: tuple[Times, Times] = np.zeros(0, np.int64), np.zeros(0, np.int64)
         self._hurried: set[int] = set()
         self._paused = 0
         self._learn_timeout()
 
-    def go_through(self, begin: int, end: int, pause_rows: list[int], pauses: list[int], hurried: list[int]) -> None:
+    def go_through(
+        self,
+        begin: int,
+        end: int,
+        pause_rows: list[int],
+        pauses: list[int],
+        turns: tuple[Times, Times],
+        hurried: list[int],
+    ) -> None:
         """Take exchanges [begin, end). `pauses`: the master's, ns, before the rows `pause_rows`, and which of them are
-        far below the usual."""
+        far below the usual; `turns`: see `turns_before`."""
+        self._turns = turns
         self._pause_rows, self._pauses, self._hurried, self._paused = pause_rows, pauses, set(hurried), 0
         self._learn_timeout()
         one, cycles, requests = self._exchanged, self._judge.seen.cycles, self._requests
@@ -296,7 +307,10 @@ class StretchEvidence:
         gaps, first = self._judge.gaps, self._exchanged.rows.first
         if self._hurried:
             gaps.hurried.extend(first + self._pause_rows[at] - 1 for at in range(begin, end) if at in self._hurried)
-        gaps.paused(self._pauses[begin:end])
+        newest = slice(max(begin, end - TURNS_KEPT), end)
+        cycles, answers = (times[newest].tolist() for times in self._turns)
+        turns = [turn for turn in zip(cycles, answers, strict=True) if turn[1]]
+        gaps.paused(self._pauses[begin:end], turns)
         self._paused = end
 
     def _count_all(self) -> None:

@@ -135,6 +135,22 @@ class Unhurried(PollingMaster):
         super()._go_on(at + self.dice.randrange(self.spread))
 
 
+class ByTheClock(PollingMaster):
+    """A master that asks every `tick` ns, however soon it is answered, and asks nothing again."""
+
+    def __init__(self, requests: Sequence[Request], line: LineSettings, tick: int, **more: Any) -> None:
+        super().__init__(requests, line, **{**more, "timeout": tick // 2, "retries": 0})
+        self.tick, self.began = tick, 0
+
+    def wake(self, now: int) -> tuple[Send, ...]:
+        sends = super().wake(now)
+        self.began = now if sends else self.began
+        return sends
+
+    def _go_on(self, at: int) -> None:
+        super()._go_on(max(at, self.began + self.tick))
+
+
 class ScansOnce(PollingMaster):
     """Asks in turn; from `at` on it looks once for whom else there is, each of `scan` in one round, then goes on."""
 

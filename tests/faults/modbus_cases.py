@@ -15,6 +15,7 @@ from tests.faults.buses import RTU_LINE, modbus
 from tests.faults.case import Case, Said
 from tests.faults.hearing import echoing, hidden_latency, noisy_tap, of_party, sent_otherwise, unheard
 from tests.faults.misbehaving import (
+    ByTheClock,
     Rewrites,
     SpoiltFirst,
     SwapsChecks,
@@ -28,7 +29,7 @@ from tests.faults.misbehaving import (
     other_value,
     swapped_check,
 )
-from tests.faults.stations import AnswersBroadcasts, Ignores, Of
+from tests.faults.stations import AnswersBroadcasts, Dies, Ignores, Of
 from tests.faults.workbench import Modbus, server, usual_requests, usual_stations
 
 MS = 1_000_000
@@ -78,6 +79,13 @@ def _two_masters(unit_masters: tuple[int, ...], every: int, is_ascii: bool, *, s
 
 
 _turns = Modbus(usual_requests(_FOUR), usual_stations(_FOUR, unit_2=60 * MS, unit_3=60 * MS), retries=0)
+
+_by_the_clock = replace(
+    _turns,
+    asked=(*usual_requests(_FOUR), *usual_requests(_FOUR, 30)),
+    stations=usual_stations(_FOUR, unit_4=30 * MS),
+    master=partial(ByTheClock, tick=90 * MS),
+)
 
 MODBUS_CASES: tuple[Case, ...] = (
     # damage that is the same each time
@@ -190,6 +198,28 @@ MODBUS_CASES: tuple[Case, ...] = (
         (("MB020", "bus"),),
         hear=partial(unheard, ("unit 3",), 1.0),
         never=("MB001", "MB003"),
+        seeds=1,
+    ),
+    # a master that goes on as after an answer, since it never waits for one
+    Case(
+        "RTU station absent, master by the clock",
+        replace(_by_the_clock, stations=usual_stations((1, 3, 4), unit_4=30 * MS)),
+        (("MB001", "station 2"),),
+        never=("MB020",),
+        seeds=1,
+    ),
+    Case(
+        "RTU answers lost, master by the clock",
+        replace(_by_the_clock, faults=(LostResponse(0.08, ("unit 2",)),)),
+        (("MB002", "station 2"),),
+        never=("MB020",),
+        seeds=2,
+    ),
+    Case(
+        "RTU station dies, master by the clock",
+        replace(_by_the_clock, change={2: partial(Dies, at=30 * S)}),
+        (("MB003", "station 2"),),
+        never=("MB020",),
         seeds=1,
     ),
     Case(

@@ -77,3 +77,17 @@ def test_answers_that_are_waited_for_are_lost(paper_bus):
 
 def test_a_station_that_is_asked_again_is_absent_however_soon(paper_bus):
     assert ("MB001", "station 2") in graves_of(waiting(paper_bus(), 12, 60, tries=3))
+
+
+@pytest.mark.parametrize("by_the_clock", [True, False])
+def test_a_master_by_the_clock_goes_on_as_after_an_answer_where_there_is_none(paper_bus, by_the_clock):
+    bus, pause = paper_bus(), PAUSE
+    for turn in range(12):
+        for unit, took in zip(UNITS, (8.0, 6.0, 30.0), strict=True):
+            bus.say(read(unit), pause)
+            left = 80.0 if by_the_clock else took + LASTS + PAUSE
+            if unit != 2:
+                bus.say(values(unit, turn), took)
+                left -= took + LASTS
+            pause = left
+    assert graves_of(bus) >= ({("MB001", "station 2")} if by_the_clock else {("MB020", "bus")})
