@@ -204,12 +204,11 @@ def _of_masters(seen: BusRecord) -> Iterator[Finding]:
 
     hasty, broken_in = list(filter(too_soon, seen.hasty)), list(filter(too_soon, seen.broken_in))
     gaps = sorted(row[0] for row in (*hasty, *broken_in))
-    if len(gaps) < _MASTERS_LEAST:
-        yield from list(_asked_twice(seen)) or _crossed(seen)
-        return
     same = MS + seen.timing.latency
-    habitual = max(sum(abs(one - gap) <= same for one in gaps) for gap in gaps)
-    if not broken_in and len(gaps) >= _HABIT_LEAST and 4 * habitual > 3 * len(gaps):
+    habitual = max((sum(abs(one - gap) <= same for one in gaps) for gap in gaps), default=0)
+    may_be_habit = not broken_in and len(gaps) >= _HABIT_LEAST and 4 * habitual > 3 * len(gaps)
+    if len(gaps) < _MASTERS_LEAST or may_be_habit:
+        yield from list(_asked_twice(seen)) or _crossed(seen)
         return
     tally = Tally()
     for _, _, time, before, no in sorted((*hasty, *broken_in), key=lambda row: row[2]):

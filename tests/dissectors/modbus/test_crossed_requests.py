@@ -30,6 +30,13 @@ def test_requests_between_another_and_its_answer_are_those_of_a_second_master(bu
     assert ("MB203", "bus") in graves_of(bus)
 
 
+def test_a_second_master_is_told_by_order_where_its_haste_looks_like_a_habit(paper_bus):
+    bus = polls(paper_bus(latency=2_500_000), 6)
+    for turn in range(8):
+        polls(bus.say(PANEL).say(POLL, turn % 3).say(FEW, 4).say(VALUES, 8), 5)
+    assert ("MB203", "bus") in graves_of(bus)
+
+
 def test_an_answer_to_what_damage_hides_is_not_held_against_the_station(bus):
     for _ in range(4):
         polls(bus.exchange(PANEL, FEW), 2)
