@@ -12,10 +12,11 @@ from dissectors.frame import Flaw
 from dissectors.late_speakers import reaching
 from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
+from dissectors.modbus.exception_meanings import EXCEPTIONS, MAKER_EXCEPTION, USED_ALIKE, VENDOR_EXCEPTION
 from dissectors.modbus.finding_words import note_if, request_words, wilson
 from dissectors.modbus.functions import EXCEPTIONS as EXCEPTION_NAMES
 from dissectors.modbus.response_groups import AnsweredRequest
-from dissectors.modbus.rules import EXCEPTIONS, MAKER_EXCEPTION, RULES, USED_ALIKE, VENDOR_EXCEPTION
+from dissectors.modbus.rules import RULES
 from dissectors.modbus.station_record import Key, Requested, StationRecord, middle
 from dissectors.words import duration, fine_milliseconds
 

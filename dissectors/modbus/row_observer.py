@@ -1,0 +1,218 @@
+"""What each row of a Modbus line tells the rules, whatever comes of its transaction: that is `observer.py`'s."""
+
+from __future__ import annotations
+
+from dissectors.frame import Event, Frame, Header, Noise, Role
+from dissectors.line import MS
+from dissectors.modbus.asked import AskedRequest
+from dissectors.modbus.envelope import readable_adu
+from dissectors.modbus.exchange import is_begin_of
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT
+from dissectors.modbus.long_silences import SILENCE_LEAST
+from dissectors.modbus.remembered import (
+    BEGIN,
+    HASTY_KEPT,
+    LAST_STANDARD_UNIT,
+    LOST_KEPT,
+    OPEN_KEPT,
+    Remembered,
+)
+from dissectors.tracker import Placement
+
+TURNAROUND = 90 * MS
+"""Nobody speaks so soon after a broadcast: the master waits 100 … 200 ms (Modbus over Serial Line V1.02, 2.4.1)."""
+
+AT_ONCE = 50 * MS
+"""No master repeats a request so soon."""
+
+STRAY_KEPT = 600
+"""Octets, more than the longest frame; of more nothing is said."""
+
+
+class RowObserver(Remembered):
+    """Fed row by row."""
+
+    def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
+        """See `dissectors.findings.Judge`."""
+        seen = self.seen
+        gap = event.start - seen.now
+        seen.first = event.start if seen.first is None else seen.first
+        seen.now = max(seen.now, event.end)
+        if self._is_cut_echo(event):
+            seen.cut_echoes.add(event.start, no)
+            return
+        is_behind_silence = gap >= SILENCE_LEAST and self.silences.is_one(gap)
+        if is_behind_silence:
+            self._see_silence(gap, placement)
+        tx = self.newest if placement is None or header is None else placement.tx
+        self.torn.see(no, event, tx, is_good_frame=header is not None and header.ok)
+        if isinstance(event, Noise) or header is None or placement is None:
+            self._gather(event)
+            self._see_broken(no, event, event.octets)
+            self._see_noise(no, event)
+            self.open = None
+            self.gaps.hear_noise()
+            self.ends.hear_noise(event)
+            return
+        if event.slack > self.timing.latency + MS:
+            self.late_read = no
+        octets = readable_adu(event)
+        if not header.ok:
+            self._see_broken(no, event, octets)
+        self.gaps.see(no, event, header, placement)
+        self.ends.see(no, event, header, placement)
+        if placement.role is Role.RESPONSE:
+            self._see_answer(no, event, header, placement, octets)
+        elif placement.role is Role.EITHER:
+            self.open = self.broadcast = None
+        else:
+            self.newest = placement.tx
+            self._see_request(AskedRequest(no, event, header, octets, is_behind_silence), placement)
+        if header.ok and octets and octets[0] > LAST_STANDARD_UNIT:
+            self.station(octets[0]).reserved.add(event.start, no)
+
+    def _see_silence(self, gap: int, placement: Placement | None) -> None:
+        """A long silence before a row: what was given up in it as not answered may have been."""
+        asked = self.open
+        is_answer = placement is not None and placement.tx == self.newest
+        if asked is None or is_answer or not self.silences.note(asked.no, gap):
+            return
+        for tx, lost in list(self.lost.items()):
+            if lost.no == asked.no:
+                self.station(lost.unit).withdraw(self.lost.pop(tx))
+
+    def _see_request(self, asked: AskedRequest, placement: Placement) -> None:
+        if len(self.asked) < OPEN_KEPT:
+            self.asked[placement.tx] = asked
+        if not asked.header.ok:
+            self._note_flaw(placement.tx, asked.frame)
+        if self._is_no_request(asked):
+            self.no_requests.append(asked.no)
+            self.open = self.broadcast = None
+            return
+        self.seen.requests += 1
+        if asked.header.ok and len(asked.octets) > BEGIN and len(self.begins) < OPEN_KEPT:
+            self.begins.add(asked.octets[:BEGIN])
+        if self.open is not None:
+            self.waited_in_vain(self.open, asked)
+        is_broadcast = placement.role is Role.BROADCAST or (asked.unit == BROADCAST and not asked.is_for_nobody)
+        self.open = None if is_broadcast or not asked.header.ok else asked
+        self.broadcast = asked if is_broadcast and asked.header.ok else None
+
+    def _is_no_request(self, asked: AskedRequest) -> bool:
+        """Whether it is an answer in the shape of a request: to a broadcast, or by another unit than the one asked."""
+        if self.broadcast is not None and self._is_answer_to_broadcast(asked):
+            self.seen.answers_to_broadcast.add(asked.frame.start, self.broadcast.no, asked.no)
+            self.seen.broadcast_answers[asked.unit] += 1
+            return True
+        if self.open is not None and self._is_answer_of_another(self.open, asked):
+            self.seen.pair((self.open.unit, asked.unit)).add(asked.frame.start, self.open.no, asked.no)
+            self.elsewhere[self.open.no] = asked.unit
+            return True
+        return False
+
+    def waited_in_vain(self, before: AskedRequest, asked: AskedRequest) -> None:
+        """A request after another that nothing has followed."""
+        self.station(before.unit).waited += max(0, asked.frame.start - before.frame.start)
+        if not asked.header.ok or before.is_for_nobody:
+            return
+        gap = max(0, asked.frame.start - before.frame.end)
+        if asked.octets == before.octets:
+            if gap > self.timing.t35 + self.timing.latency and before.header.role is Role.REQUEST:  # no echo
+                self.learnt.unanswered(gap, repeated=True)
+            return
+        if before.header.role is not Role.REQUEST:  # a write has the shape of its answer, which may have come late
+            return
+        self.learnt.unanswered(gap)
+        turn = self.learnt.turn(before.unit, before.answer_time(self.timing.char))
+        if turn is not None:
+            kind = self.hasty if gap < turn[0] else self.unheard if gap <= turn[1] else self.waited_for
+            kind.append(before.no)
+        self.waits[before.no] = gap
+        if len(self.waits) > LOST_KEPT:
+            del self.waits[next(iter(self.waits))]
+        if len(self.seen.hasty) < HASTY_KEPT:
+            self.seen.hasty.append((gap + before.frame.slack, before.unit, asked.frame.start, before.no, asked.no))
+
+    def _see_answer(self, no: int, frame: Frame, header: Header, placement: Placement, octets: bytes) -> None:
+        self.seen.answers += 1
+        if self.broadcast is not None and frame.start - self.broadcast.frame.end < TURNAROUND:
+            self.seen.answers_to_broadcast.add(frame.start, self.broadcast.no, no)
+        if self.broadcast is not None and placement.source is not None:
+            self.seen.broadcast_answers[placement.source] += 1
+        self.broadcast = self.open = None
+        if header.ok:
+            is_exception = len(octets) > 2 and bool(octets[1] & EXCEPTION_BIT)
+            if header.error is not None and is_exception:
+                self.codes[placement.tx] = octets[2]
+                if len(self.codes) > OPEN_KEPT:
+                    self.codes.clear()
+            else:
+                self.answers[placement.tx] = octets
+                if len(self.answers) > OPEN_KEPT:
+                    self.answers.clear()
+                if header.error is not None:
+                    self.contradictory.append(placement.tx)
+        elif placement.source is not None:
+            self.damaged.append(placement.tx)
+            self._gather(frame)
+            self._note_flaw(placement.tx, frame)
+            self.bad_ends[placement.tx] = placement.source, no, frame
+            if len(self.bad_ends) > OPEN_KEPT:
+                self.bad_ends.clear()
+
+    def _see_noise(self, no: int, event: Event) -> None:
+        if self.broadcast is not None and event.start - self.broadcast.frame.end < TURNAROUND:
+            if len(event.octets) >= 3:
+                self.seen.noise_after_broadcast.add(event.start, self.broadcast.no, no)
+            return
+        if self.open is None and self.broadcast is None and len(event.octets) >= BEGIN:
+            self.seen.late_speakers.noise(event.start, no)
+        self.broadcast = None
+
+    def _is_answer_to_broadcast(self, asked: AskedRequest) -> bool:
+        """Whether what looks like a request is a station's copy of the broadcast before it, as itself or as 0."""
+        broadcast = self.broadcast
+        if broadcast is None or asked.octets[1:] != broadcast.octets[1:] or (self.seen.echoes and not asked.unit):
+            return False
+        gap = asked.frame.start - broadcast.frame.end
+        return self.timing.char + self.timing.latency < gap < TURNAROUND
+
+    def _is_answer_of_another(self, before: AskedRequest, asked: AskedRequest) -> bool:
+        """Whether what looks like a request is the copy of the one before it, by a unit that is known to answer so."""
+        return asked.octets[1:] == before.octets[1:] and (before.unit, asked.unit) in self.seen.pairs
+
+    def _gather(self, event: Event) -> None:
+        """Keep octets that are no good frame, in the transaction of the newest request."""
+        tx = self.newest
+        if tx is None:
+            return
+        before = self.stray.get(tx, b"")
+        self.stray[tx] = (before + event.octets)[:STRAY_KEPT]
+        if event.marks:
+            self.marked.append(tx)
+        if len(self.stray) > OPEN_KEPT:
+            self.stray.clear()
+
+    def _note_flaw(self, tx: int, frame: Frame) -> None:
+        if frame.repair is not None:
+            self.flaws[tx] = frame.repair.flaw
+            if len(self.flaws) > OPEN_KEPT:
+                self.flaws.clear()
+
+    def _see_broken(self, no: int, event: Event, octets: bytes) -> None:
+        """A damaged frame that begins as a request to another station, while one is asked: somebody else spoke."""
+        asked, begin = self.open, octets[:BEGIN]
+        if asked is None or begin not in self.begins or begin[0] == asked.unit:
+            return
+        gap = max(0, event.start - asked.frame.end)
+        if len(self.seen.broken_in) < HASTY_KEPT:
+            self.seen.broken_in.append((gap + asked.frame.slack, asked.unit, event.start, asked.no, no))
+
+    def _is_cut_echo(self, event: Event) -> bool:
+        """Whether it is the begin of the request before it, given back at once and cut short."""
+        asked = self.open
+        if asked is None or not is_begin_of(event.octets, asked.frame.octets):
+            return False
+        gap = max(0, event.start - asked.frame.end)
+        return gap < (AT_ONCE if asked.header.role is Role.REQUEST else self.timing.t35)
