@@ -65,10 +65,12 @@ class Timing:
     """A line and how far its times can be trusted.
 
     `latency`: ns that adapter and host may hold an octet back (FTDI: latency timer + 1 ms); 0 for exact times.
+    `is_told`: whether that is known; else it is what the reads seem to say, and single times may be later still.
     """
 
     line: LineSettings = LineSettings()
     latency: int = 0
+    is_told: bool = True
 
     @property
     def char(self) -> int:

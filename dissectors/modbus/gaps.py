@@ -25,6 +25,7 @@ PAUSES_KEPT = 32
 """The newest pauses, of which `LearnedTiming` keeps no more."""
 
 _SLOW_KEPT = 2
+_FIFO_CHARS = 5  # of silence before the last octets of a frame: a UART that nobody named holds them for four
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +43,8 @@ class Gaps:
         self.latency = timing.latency
         self._char = timing.char
         self.pause_limit = timing.t15
+        self._is_told = timing.is_told
+        self._pause_least = timing.t15 + (0 if timing.is_told else _FIFO_CHARS * timing.char)
         self.close = timing.t35 - timing.line.bits(1)  # a silence between frames that is below, by the longest reading
         self.seen = seen
         self._learnt = learnt
@@ -117,8 +120,8 @@ class Gaps:
         """Take a frame with more silence in it than the rule allows. `is_torn`: so much of it stands at one place that
         the framer had to put the frame together, which no even spacing does."""
         usual = self.spacing_of(sender)
-        is_uneven = len(usual) >= SPACING_LEAST and silence - (length - 1) * max(0, middle(usual)) > self.pause_limit
-        if is_torn or is_uneven:
+        is_uneven = len(usual) >= SPACING_LEAST and silence - (length - 1) * max(0, middle(usual)) > self._pause_least
+        if is_uneven or (is_torn and self._is_told):
             self.seen.gap_tally(self.seen.paused, sender).add(start, no)
 
     def spacing_of(self, sender: str) -> deque[int]:

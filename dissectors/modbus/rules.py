@@ -186,7 +186,8 @@ _ALL = (
         "More than 1.5 characters of silence inside a good RTU frame (Modbus over Serial Line V1.02, 2.5.1.1), even by "
         "the shortest reading that the adapter leaves, and beyond the even spacing of octets that the sender shows in "
         "most of its frames, or 3.5 characters of it at one place. At least three, and only where the adapter's delay "
-        "is at most a fifth of 1.5 characters.",
+        "is at most a fifth of 1.5 characters. Where nobody said which adapter it was, only what is five characters "
+        "longer counts, and no place: a UART may hold the last octets back.",
         "a sender that cannot keep its transmitter fed: an interrupted program, a USB adapter, a radio link",
         "strict receivers drop such frames; use a sender with a FIFO or a lower baud rate",
     ),

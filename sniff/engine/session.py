@@ -135,7 +135,8 @@ class Session:
     @property
     def timing(self) -> Timing:
         """The line with what the adapter allows."""
-        return Timing(self.line, self.adapter.latency)
+        latency, said_by = self.adapter.latency, self.adapter.latency_from
+        return Timing(self.line, latency, said_by not in UNNAMED and not said_by.startswith(INFERRED))
 
     def found(self, line: LineSettings | None, protocol: str | None) -> Session:
         """The session once its search has ended with these settings."""

@@ -44,14 +44,30 @@ def test_pauses_are_judged_where_the_adapter_is_quick_enough(
     assert ("MB303" in codes) is not judged
 
 
-@pytest.mark.parametrize(("found", "is_said"), [(FoundBy.JOINED, True), (FoundBy.GAP, False)])
+@pytest.mark.parametrize(
+    ("found", "is_told", "is_said"),
+    [(FoundBy.JOINED, True, True), (FoundBy.GAP, True, False), (FoundBy.JOINED, False, False)],
+)
 def test_a_sender_that_always_pauses_at_one_place_is_told_from_even_spacing(
-    frame_of: Callable[..., Frame], found: FoundBy, is_said: bool
+    frame_of: Callable[..., Frame], found: FoundBy, is_told: bool, is_said: bool
 ) -> None:
-    timing = Timing(LineSettings.parse("9600,8N1"), 0)
+    timing = Timing(LineSettings.parse("9600,8N1"), 0, is_told)
     judge = ModbusFindings(timing)
     for no in range(1, 21):
         now = no * 200 * MS
         frame = replace(frame_of(READ, start=now, end=now + 8 * timing.char + 8 * MS), found=found)
         judge.see(no, frame, peek_rtu(frame), Placement(no, no, peek_rtu(frame).role, None, 1))
     assert any(finding.code == "MB302" for finding in judge.findings()) is is_said
+
+
+@pytest.mark.parametrize("is_told", [True, False])
+def test_what_a_fifo_holds_back_is_nobodys_pause_where_nobody_said_the_adapter(
+    frame_of: Callable[..., Frame], is_told: bool
+) -> None:
+    timing = Timing(LineSettings.parse("9600,8N1"), 0, is_told)
+    judge = ModbusFindings(timing)
+    for no in range(1, 41):
+        now, held = no * 200 * MS, 4 * timing.char if no > 30 else 0
+        frame = frame_of(READ, start=now, end=now + 8 * timing.char + held)
+        judge.see(no, frame, peek_rtu(frame), Placement(no, no, peek_rtu(frame).role, None, 1))
+    assert any(finding.code == "MB302" for finding in judge.findings()) is is_told
