@@ -68,6 +68,7 @@ class BusRecord:
     before, time, frame before, frame). `broken_in`: the same of
     damaged frames that begin as a request to another station. `close`, `paused`, `bare_ends`: by sender; of the first,
     (time, frame before, frame). `bare_ends`: ASCII frames without their LF.
+    `held_back`: of the paused frames, those that an adapter may have made so that nobody named.
     `damaged_here`: damaged requests that were answered all the same.
     `again`: requests that were answered when they came a second time.
     `crossed`: answers to the request before the newest, which came sooner than a turn takes.
@@ -102,6 +103,7 @@ class BusRecord:
     broken_in: list[tuple[int, int, int, int, int]] = field(default_factory=list)
     close: dict[str, list[tuple[int, int, int]]] = field(default_factory=dict)
     paused: dict[str, Tally] = field(default_factory=dict)
+    held_back: Counter[str] = field(default_factory=Counter)
     bare_ends: dict[str, Tally] = field(default_factory=dict)
     pairs: dict[tuple[int, int], Tally] = field(default_factory=dict)
     repeated_elsewhere: Counter[int] = field(default_factory=Counter)

@@ -44,7 +44,7 @@ class Gaps:
         self._char = timing.char
         self.pause_limit = timing.t15
         self._is_told = timing.is_told
-        self._pause_least = timing.t15 + (0 if timing.is_told else _FIFO_CHARS * timing.char)
+        self._may_be_held = timing.t15 + _FIFO_CHARS * timing.char
         self.close = timing.t35 - timing.line.bits(1)  # a silence between frames that is below, by the longest reading
         self.seen = seen
         self._learnt = learnt
@@ -120,9 +120,10 @@ class Gaps:
         """Take a frame with more silence in it than the rule allows. `is_torn`: so much of it stands at one place that
         the framer had to put the frame together, which no even spacing does."""
         usual = self.spacing_of(sender)
-        is_uneven = len(usual) >= SPACING_LEAST and silence - (length - 1) * max(0, middle(usual)) > self._pause_least
-        if is_uneven or (is_torn and self._is_told):
+        uneven = silence - (length - 1) * max(0, middle(usual)) if len(usual) >= SPACING_LEAST else 0
+        if uneven > self.pause_limit or (is_torn and self._is_told):
             self.seen.gap_tally(self.seen.paused, sender).add(start, no)
+            self.seen.held_back[sender] += not self._is_told and uneven <= self._may_be_held
 
     def spacing_of(self, sender: str) -> deque[int]:
         """Silence an octet of the last frames of a sender, ns."""

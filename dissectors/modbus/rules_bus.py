@@ -255,8 +255,9 @@ def _of_gaps(seen: BusRecord) -> Iterator[Finding]:
         yield found(
             RULES["MB304"], "adapter", words, first=seen.first or 0, last=seen.now, count=count, evidence=evidence
         )
-    paused = {sender: paused[sender] for sender in blamed if paused[sender].count >= _PAUSES_LEAST}
-    for sender, tally in sorted(paused.items()):
+    for sender, tally in sorted((sender, paused[sender]) for sender in blamed):
+        if tally.count - seen.held_back[sender] < _PAUSES_LEAST:
+            continue
         words = f"{tally.count} frames with over {fine_milliseconds(timing.t15)} of silence inside"
         yield tally.found(RULES["MB302"], sender, words)
     if not seen.judges_pauses and seen.stations:
