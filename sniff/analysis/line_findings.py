@@ -14,13 +14,13 @@ from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction, Verdict
 from dissectors.words import milliseconds
-from sniff.analysis.breaks import breaks_in
+from sniff.analysis.breaks import LEVELS, breaks_in
 from sniff.analysis.judgement import Heard, Judgement
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.line_use import LineUse
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, what_fits
 from sniff.analysis.remains import Remains
-from sniff.analysis.sender_findings import BUS, LEVELS, MASTER, MOST_SENDERS, WRONG, Senders
+from sniff.analysis.sender_findings import BUS, MASTER, MOST_SENDERS, WRONG, Senders
 from sniff.analysis.stray_findings import strays_found
 from sniff.analysis.time_patterns import Stop, TimePatterns
 from sniff.analysis.torn_pieces import TornPieces
@@ -237,7 +237,7 @@ class LineFindings:
         self._pieces.take(sender, event.start, no)
 
     def _see_noise(self, no: int, noise: Noise) -> None:
-        if noise.reason in (Reason.BREAK, Reason.PAD) or breaks_in(noise):
+        if noise.reason is Reason.PAD or breaks_in(noise):
             return
         if self._rows == 1:  # the capture began in the middle of something
             return

@@ -129,9 +129,10 @@ _ALL = (
         "breaks",
         "The line was held low for longer than a character. Counted are disturbances: all within 250 ms of the first "
         "are one. One, all within one second, or few (as in LN101) are only noted. Where at least four, and 8 in 10 "
-        "of them, begin in or directly after the frames of one station, far more than its share, that station is "
-        "named. No break is a zero octet among others that are no frame, or in a good frame: so sounds another baud "
-        "rate or format.",
+        "of them, begin in or directly after the frames of one station, far more than its share, and hold the line "
+        "low three times at most, that station is named: longer ones are somebody's talk, behind it by time alone. No "
+        "break is a zero octet among others that are no frame, or in a good frame: so sounds another baud rate or "
+        "format.",
         "no fail-safe bias while nobody drives the line, A and B swapped at one device, or a short circuit",
         "bias resistors at one place of the line; A and B of devices added last",
         told_by=_DAMAGED,
