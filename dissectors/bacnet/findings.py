@@ -14,6 +14,7 @@ from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_ALL_SILENT, T_REPLY_D
 from dissectors.bacnet.ring import COARSE_LIMIT, Happened, Ring, RingEventKind, RingNode, lies_between
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.bacnet.rules import RULES
+from dissectors.chances import is_rare
 from dissectors.findings import Finding, Severity, as_consequence, counted, times
 from dissectors.frame import Event, Header
 from dissectors.line import Timing
@@ -230,7 +231,7 @@ def _counted(ring: Ring) -> Iterable[Remark]:
                 node = ring.nodes.get(mac) if mac is not None else None
                 if code == "MS102" and (happened.count == 1 or _share(happened.count, node) < least_share):
                     severity = Severity.NOTE
-                if code == "MS301" and happened.count == 1:
+                if code == "MS301" and is_rare(happened.count, node.requests_received if node else 0, ring.span):
                     severity = Severity.NOTE
                 seen = words.format(times=times(happened.count), requests=counted(happened.count, "request"))
                 # a forbidden address is the sender's affair, and may stand for no station

@@ -164,7 +164,8 @@ _ALL = (
         "MS301",
         Severity.WARNING,
         "no answer",
-        "A Data Expecting Reply was followed neither by data nor by Reply Postponed. A single one is only noted.",
+        "A Data Expecting Reply was followed neither by data nor by Reply Postponed. A single one, or fewer than 1 "
+        "in 100 and not surely over two a minute, is only noted.",
         "the station is off, busy or at another address; or the answer was lost on the line",
         "whether it answers other requests; damaged frames at the same time",
     ),
@@ -209,7 +210,8 @@ _ALL = (
         "MS401",
         Severity.WARNING,
         "damaged frames",
-        "Frames whose header or data CRC is wrong, or that end early, more than one in 1000 and at least three.",
+        "Frames whose header or data CRC is wrong, or that end early, more than one in 1000 and at least three. Fewer "
+        "than 1 in 100 and not surely over two a minute are only noted.",
         "noise, collisions, wrong termination or bias, or two stations that send at once",
         _WIRING,
     ),

@@ -207,8 +207,8 @@ class N2Findings:
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far: the bus first, then station by station."""
-        seconds = (self.now - (self.first or 0)) / 1e9
-        heard = N2Evidence(self.now, seconds, self.master, self.stations, self.masters.seen, self._stray, self.strikes)
+        span = self.now - (self.first or 0)
+        heard = N2Evidence(self.now, span, self.master, self.stations, self.masters.seen, self._stray, self.strikes)
         found = (reaching(one, self.late_speakers) if one.code == "N2011" else one for one in worded(heard))
         return (*found, *of_late_speakers(heard, self.late_speakers))
 

@@ -45,8 +45,8 @@ RULES: dict[str, Rule] = {
             "address and is counted at the station that was asked. A sender is named that has over four times the "
             "damage that noise at the rate of all others would have done while it sends, or all of it where chance "
             "would seldom have struck it alone; up to four in a row with no whole answer between count as one, for a "
-            "master repeats into the same disturbance. Else it is the bus's. One alone, or fewer than 1 in 100 and at "
-            "most two a minute, is only noted: Johnson Controls calls up to two a minute tolerable.",
+            "master repeats into the same disturbance. Else it is the bus's. One alone, or fewer than 1 in 100 and "
+            "not surely over two a minute, is only noted: Johnson Controls calls up to two a minute tolerable.",
             "noise, wrong termination or bias, or two that talk at once",
             "if one station only: its stub, its connector; if all: termination, bias, ground",
             explains=("N2005", "LN101", "LN103", "LN204"),
@@ -57,8 +57,8 @@ RULES: dict[str, Rule] = {
             "no answer",
             "Commands that no answer followed, not even a late one. An error where the master turned to a station "
             "several times, or over 11 times at once, and got none. A single turn is only noted, or fewer than 1 in "
-            "100 and at most two a minute; and so are many addresses that are only asked who they are: a scan. Where "
-            "several are asked and nobody but the master is heard, one finding names the bus.",
+            "100 and not surely over two a minute; and so are many addresses that are only asked who they are: a scan. "
+            "Where several are asked and nobody but the master is heard, one finding names the bus.",
             "station off, wrong address or wrong baud rate, or a broken wire; all of them: one between them and here",
             "check its supply, address and wiring, and whether the master has its values: then only this tap does not "
             "hear it",
@@ -138,7 +138,8 @@ RULES: dict[str, Rule] = {
             Severity.WARNING,
             "answer repeated",
             "The same good answer came again to one command, later than an echo would. A single one, or fewer than 1 "
-            "in 100 and at most two a minute, is only noted. It proves no second station: the octets are the same.",
+            "in 100 and not surely over two a minute, is only noted. It proves no second station: the octets are the "
+            "same.",
             "a repeater or converter that gives back what it hears, a station that sends twice, or two stations with "
             "one address that hold the same",
             "switch the station off and see whether something still answers; then the repeater",
@@ -162,7 +163,7 @@ RULES: dict[str, Rule] = {
             "Commands without an answer, behind which the master asks something else after one try, within three "
             "quarters of the shortest time that it waited before it repeated one (of 250 ms, the least that an NAE can "
             "be given, where it repeated none). So it had an answer. Asking who is there does not count. A single one, "
-            "or fewer than 1 in 100 and at most two a minute, is only noted.",
+            "or fewer than 1 in 100 and not surely over two a minute, is only noted.",
             "a tap that does not hear what the master does: behind a repeater, on one pair of a four-wire line, loose; "
             "no station is to blame",
             "move the tap towards the stations that are not heard; where none is, listen on the other pair",

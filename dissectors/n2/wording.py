@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
+from dissectors.chances import is_rare
 from dissectors.findings import Finding, Severity, Tally, counted, times
 from dissectors.frame import Flaw
 from dissectors.line import MS, NS_PER_S
@@ -37,10 +38,10 @@ SCAN = 8
 
 @dataclass(frozen=True, slots=True)
 class N2Evidence:
-    """All that was gathered up to `now` (ns) in `seconds`."""
+    """All that was gathered up to `now` (ns), within `span` ns."""
 
     now: int
-    seconds: float
+    span: int
     master: Damages
     stations: Mapping[int, N2StationRecord]
     masters: Tally
@@ -48,9 +49,8 @@ class N2Evidence:
     strikes: Strikes
 
     def is_rare(self, tally: Tally, of: int) -> bool:
-        """Whether so few are not worth a warning: one, or under 1 in 100 and at most two a minute."""
-        minutes = max(1, -(-int(self.seconds) // 60))
-        return tally.count == 1 or (tally.count <= 2 * minutes and 100 * tally.count < of)
+        """Whether so few are not worth a warning."""
+        return is_rare(tally.count, of, self.span)
 
     def noted_if(self, rare: bool, finding: Finding) -> Finding:
         """The finding, only as a note where it is rare."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
+from dissectors.chances import is_rare
 from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, found, times
 from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Noise, Place, Reason, Role
 from dissectors.line import MS, NS_PER_S
@@ -387,9 +388,8 @@ class LineFindings:
         return found(RULES[code], subject, words, first=self._first, last=self._now)
 
     def _note_if(self, count: int, of: int) -> Severity | None:
-        """A note where so few are not worth a warning: one, or under 1 in 100 and at most two a minute."""
-        minutes = max(1, -(-(self._now - self._first) // (60 * NS_PER_S)))
-        return Severity.NOTE if count == 1 or (count <= 2 * minutes and 100 * count < of) else None
+        """A note where so few are not worth a warning."""
+        return Severity.NOTE if is_rare(count, of, self._now - self._first) else None
 
 
 def _sender(row: Row, nouns: Callable[[str], str]) -> str:
