@@ -10,7 +10,8 @@ from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_hearing import TRUSTED, hasty, hearing, takes_unheard, unheard_share
 from dissectors.bacnet.findings_of_refusals import REFUSED_KEPT, Refusals
 from dissectors.bacnet.findings_of_use import polls, use
-from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_ALL_SILENT, T_REPLY_DELAY, T_USAGE_DELAY
+from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
+from dissectors.bacnet.lost_tokens import longest_wait
 from dissectors.bacnet.ring import COARSE_LIMIT, Happened, Ring, RingEventKind, RingNode, lies_between
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.bacnet.rules import RULES
@@ -68,6 +69,7 @@ def judge(ring: Ring) -> tuple[Finding, ...]:
     """All findings about a ring, the gravest first, consequences as notes that name their cause."""
     made = [
         *_tokens(ring),
+        *_silences(ring),
         *_holders(ring),
         *_counted(ring),
         *_times(ring),
@@ -118,16 +120,8 @@ def _comes_back(ring: Ring, mac: int, left: int) -> bool:
 
 def _tokens(ring: Ring) -> Iterable[Remark]:
     for (what, mac), happened in ring.happened.items():
-        if what is RingEventKind.LOST_TOKEN:
-            longest = max((event.value or 0 for event in happened.events), default=0)
-            makers = sorted({event.other for event in happened.events if event.other is not None})
-            held = f"MAC {mac} had it" if mac is not None else _unheld(happened)
-            grave = None if mac is not None else Severity.WARNING if happened.count > 1 else Severity.NOTE
-            seen = (
-                f"the token was lost {times(happened.count)}; {held}; silence up to {measured(longest)}; "
-                f"begun anew by MAC {listed(makers)}"
-            )
-            yield of("MS101", mac, seen, happened, grave)
+        if what is RingEventKind.LOST_TOKEN and mac is not None:
+            yield of("MS101", mac, _lost(happened, f"MAC {mac} had it"), happened)
         elif (
             what is RingEventKind.LEFT
             and mac is not None
@@ -153,12 +147,39 @@ def _tokens(ring: Ring) -> Iterable[Remark]:
             yield plain("MS109", ring, mac, f"{counted(node.polls_sent, 'poll')} for masters and not one token")
 
 
-def _unheld(happened: Happened) -> str:
-    """Why no station is named for lost tokens."""
-    of_all = sum((event.value or 0) >= T_ALL_SILENT for event in happened.events)
+def _lost(happened: Happened, whose: str) -> str:
+    longest = max((event.value or 0 for event in happened.events), default=0)
+    makers = sorted({event.other for event in happened.events if event.other is not None})
+    return (
+        f"the token was lost {times(happened.count)}; {whose}; silence up to {measured(longest)}; begun anew by MAC "
+        f"{listed(makers)}"
+    )
+
+
+def _silences(ring: Ring) -> Iterable[Remark]:
+    """Silences that lose tokens, and for which no station is named."""
+    lost, all_silent = ring.of(RingEventKind.LOST_TOKEN, None), ring.of(RingEventKind.ALL_SILENT, None)
+    seen = []
+    if lost.count:
+        seen.append(_lost(lost, _unheld(lost, longest_wait(ring.masters))))
+    if all_silent.count:
+        longest = max((event.value or 0 for event in all_silent.events), default=0)
+        seen.append(
+            f"{times(all_silent.count)} nothing was sent for up to {measured(longest)}, and then the ring went on "
+            "where it was, without a search for a successor: all stations were silent together, or only this tap heard "
+            "nothing"
+        )
+    if seen:
+        both = lost.merge(all_silent)
+        yield of("MS101", None, "; ".join(seen), both, Severity.WARNING if both.count > 1 else Severity.NOTE)
+
+
+def _unheld(happened: Happened, longest: int) -> str:
+    """Why no station is named for lost tokens; `longest`: that no master that is alive leaves silent, ns."""
+    of_all = sum((event.value or 0) >= longest for event in happened.events)
     all_silent = (
-        f"all stations were silent together, longer than {measured(T_ALL_SILENT)}, which no master that is alive "
-        "leaves: their supply, the line or the tap"
+        f"all stations were silent together, longer than {measured(longest)}, which no master that is alive leaves: "
+        "their supply, the line or the tap"
     )
     disturbed = "who had it is not known, or octets that are no good frame came first"
     return all_silent if of_all == len(happened.events) else f"{disturbed}; or {all_silent}" if of_all else disturbed
@@ -250,8 +271,11 @@ def _times(ring: Ring) -> Iterable[Remark]:
             if what is kind:
                 most = max((event.value or 0 for event in happened.events), default=0)
                 seen = words.format(times=times(happened.count), most=measured(most))
-                answers = 0 if mac is None or mac not in ring.nodes else ring.nodes[mac].replies
-                rare = what is RingEventKind.LATE_REPLY and happened.count < TRUSTED * unheard_share(ring) * answers
+                node = ring.nodes.get(mac, RingNode()) if mac is not None else RingNode()
+                is_reply = what is RingEventKind.LATE_REPLY
+                answers = node.replies if is_reply else node.poll_replies_sent
+                unheard = is_reply and happened.count < TRUSTED * unheard_share(ring) * answers
+                rare = unheard or is_rare(happened.count, answers, ring.span)
                 yield of(code, mac, seen, happened, Severity.NOTE if rare else None, pair=True)
     yield from _late_uses(ring)
 

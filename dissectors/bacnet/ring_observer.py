@@ -18,12 +18,12 @@ from dissectors.bacnet.limits import (
     BROADCAST,
     MAX_MASTER,
     N_MIN_OCTETS,
-    T_ALL_SILENT,
     T_NO_TOKEN,
     T_USAGE_DELAY,
     T_USAGE_TIMEOUT,
     TURNAROUND_BITS,
 )
+from dissectors.bacnet.lost_tokens import longest_wait, makes_token
 from dissectors.bacnet.repeated_token import RepeatedToken
 from dissectors.bacnet.ring import Ring, RingEvent, RingEventKind
 from dissectors.bacnet.ring_addresses import check_addresses, see_i_am
@@ -285,12 +285,21 @@ class MstpRingObserver:
             tally.note(RingEventKind.UNHEARD, frame.start, no, frame.octets[3], source)
         elif tally.edges:  # where no token was ever seen, none can be lost
             silence = self._silence(frame)
-            # so long a silence has no master alive in it: what all of them share failed, or the tap, and no holder
-            unknown = self._doubt or self._was_interrupted() or silence >= T_ALL_SILENT
-            holder = None if unknown else self._holder
-            tally.note(RingEventKind.LOST_TOKEN, frame.start, no, holder, source, silence)
-            begin_search(tally.node(source), frame.start)
+            if not makes_token(frame):
+                tally.note(RingEventKind.ALL_SILENT, frame.start, no, None, source, silence)
+            else:
+                unknown = self._doubt or self._was_interrupted() or self._were_all_silent(silence - frame.slack)
+                holder = None if unknown else self._holder
+                tally.note(RingEventKind.LOST_TOKEN, frame.start, no, holder, source, silence)
+                begin_search(tally.node(source), frame.start)
         self._forget()
+
+    def _were_all_silent(self, silence: int) -> bool:
+        """Whether no other master that the ring has can have been alive all the time."""
+        others = (
+            mac for mac, node in self._tally.nodes.items() if node.tokens_sent and not node.gone and mac != self._holder
+        )
+        return silence >= longest_wait(others)
 
     def _was_interrupted(self) -> bool:
         """Whether the last good frame was neither by nor for the holder of the token, who may have let go of it then.

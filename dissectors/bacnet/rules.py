@@ -15,8 +15,9 @@ _ALL = (
         Severity.ERROR,
         "lost token",
         "Nothing was sent for 500 ms (Tno_token) and then a station began anew: the token was lost "
-        "(ASHRAE 135, 9.5.6). The one with the lowest address begins first, 10 ms (Tslot) per address later, so that "
-        "2 s of silence are of all stations together, and nobody is named for them. Only where tokens are in the "
+        "(ASHRAE 135, 9.5.6). It looks for a successor then: where the ring goes on with anything else, no token was "
+        "lost. The one with the lowest address begins first, 10 ms (Tslot) per address later, so that a silence of "
+        "twice that time is of all stations together. Nobody is named for either. Only where tokens are in the "
         "capture.",
         "the station that had the token was reset, switched off or disturbed while it passed the token on",
         "power and wiring of the last holder; noise at that moment; whether it answers Test Request",
@@ -136,7 +137,7 @@ _ALL = (
         "MS202",
         Severity.WARNING,
         "slow to answer a poll",
-        "A Reply To Poll For Master came later than 15 ms (Tusage_delay) after the poll.",
+        "A Reply To Poll For Master came later than 15 ms (Tusage_delay) after the poll. A single one is only noted.",
         "the station risks not being taken into the ring",
         "load and firmware of the station",
     ),
@@ -173,7 +174,8 @@ _ALL = (
         "MS302",
         Severity.WARNING,
         "late answer",
-        "An answer came later than 250 ms (Treply_delay) after the request; the asker gives up at 255 … 300 ms.",
+        "An answer came later than 250 ms (Treply_delay) after the request; the asker gives up at 255 … 300 ms. "
+        "A single one, or fewer than 1 in 100 and not surely over two a minute, is only noted.",
         "the station should send Reply Postponed; its late answer collides with the next token",
         "load and firmware of the station",
     ),
