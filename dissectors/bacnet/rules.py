@@ -128,7 +128,8 @@ _ALL = (
         "too many polls for masters",
         "A station polls for a new master once in 50 tokens (Npoll); more than one in 10 is counted here, "
         "with the share of time that unanswered polls take. Polls of a search for a successor, the first one or a lost "
-        "one, do not count; but searches after a loss that stopped the bus for over a second are said, with "
+        "one, do not count. Where half of all masters do so, and two at least, it is one finding about the bus, and "
+        "theirs are noted under it. But searches after a loss that stopped the bus for over a second are said, with "
         "their cost.",
         "a station that does not count to Npoll, or polls far beyond the last address",
         "Max_Master and firmware of the stations named; gaps in the addresses",
