@@ -31,8 +31,8 @@ RULES: dict[str, Rule] = {
             "slow station",
             "Time from the end of a command to the begin of its answer, over 250 ms even when all that the adapter may "
             "have added is taken off. 250 ms is the shortest message timeout of an NAE; the standard's own limit is "
-            "not public. Only a note where no answer of it came too late for the master, or where fewer than 1 in 100 "
-            "are slow: a busy computer explains those.",
+            "not public. Only a note where no answer of it came too late for the master, or only one, or so few as in "
+            "N2004, or where so few are slow: a busy computer, or one pause of the whole bus, explains those.",
             "a station busy with other work, or a gateway in between",
             "raise the master's message timeout, or relieve the station",
             explains=("N2005", "N2011"),
@@ -113,7 +113,8 @@ RULES: dict[str, Rule] = {
             "N2011",
             Severity.WARNING,
             "answer that nobody asked for",
-            "Answers without a command before them, or after the master had gone on.",
+            "Answers without a command before them, or after the master had gone on. A single one, or fewer than 1 in "
+            "100 and not surely over two a minute, is only noted.",
             "a master that is not heard at this place of the bus, or a station far slower than the master's timeout",
             "compare the answer times with the master's timeout; move the tap",
             explains=("N2005", "N2003", "N2015", "LN1", "LN2"),

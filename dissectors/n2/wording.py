@@ -272,7 +272,7 @@ def _slow(heard: N2Evidence, name: str, station: N2StationRecord) -> Finding:
         f"{station.slow.count} of {counted(station.answered, 'answer')} took over {SLOW // MS} ms, "
         f"the longest at least {station.slowest // MS} ms"
     )
-    harmless = not station.late.count or heard.is_rare(station.slow, station.answered)
+    harmless = any(not one.count or heard.is_rare(one, station.answered) for one in (station.late, station.slow))
     return heard.noted_if(harmless, station.slow.found(RULES["N2003"], name, seen))
 
 
@@ -298,4 +298,5 @@ def _again(heard: N2Evidence, name: str, station: N2StationRecord) -> Iterator[F
         yield heard.noted_if(heard.is_rare(station.repeated, station.answered), finding)
     if station.late.count:
         seen = f"{counted(station.late.count, 'answer')} came after the master had gone on"
-        yield station.late.found(RULES["N2011"], name, seen)
+        finding = station.late.found(RULES["N2011"], name, seen)
+        yield heard.noted_if(heard.is_rare(station.late, station.answered), finding)
