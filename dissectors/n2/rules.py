@@ -163,7 +163,9 @@ RULES: dict[str, Rule] = {
             "answers not heard here",
             "Commands without an answer, behind which the master asks something else after one try, within three "
             "quarters of the shortest time that it waited before it repeated one (of 250 ms, the least that an NAE can "
-            "be given, where it repeated none). So it had an answer. Asking who is there does not count. A single one, "
+            "be given, where it repeated none). So it had an answer. Asking who is there does not count; nor does "
+            "anything of a master that surely sends by a clock, whose commands follow each other in steadier steps "
+            "than its pauses behind answers are: such a station is N2005. A single one, "
             "or fewer than 1 in 100 and not surely over two a minute, is only noted.",
             "a tap that does not hear what the master does: behind a repeater, on one pair of a four-wire line, loose; "
             "no station is to blame",
