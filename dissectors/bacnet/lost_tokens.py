@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from dissectors.bacnet.frame_types import FrameType
+from dissectors.bacnet.frame_types import PREAMBLE, FrameType
 from dissectors.bacnet.limits import T_ALL_SILENT, T_NO_TOKEN, T_SLOT
-from dissectors.frame import Frame
+from dissectors.frame import Damage, Frame
 
 _POLL = int(FrameType.POLL_FOR_MASTER)
+_SOURCE = 4  # place of the address of who sends
 
 PATIENT = 2
 """Times its own wait that a master may let pass, by its clock and its load, before it makes a token."""
@@ -22,6 +23,13 @@ PATIENT = 2
 def makes_token(frame: Frame) -> bool:
     """Whether this is how a station begins that has made a token."""
     return frame.octets[2] == _POLL
+
+
+def breaks_off(frame: Frame, holder: int | None) -> bool:
+    """Whether this is the begin of a frame that the holder of the token sent, and no more."""
+    octets = frame.octets
+    names_it = octets[:2] == PREAMBLE and len(octets) > _SOURCE and octets[_SOURCE] == holder
+    return names_it and frame.damage in (Damage.SHORT, Damage.RESTARTED)
 
 
 def longest_wait(masters: Iterable[int]) -> int:

@@ -325,6 +325,18 @@ def test_a_ring_that_goes_on_where_it_was_has_lost_no_token(silence: float):
         assert read.of("MS101").subject == "bus"
 
 
+@pytest.mark.parametrize("latency", [0, 17.5])
+@pytest.mark.parametrize(("begun", "named"), [(6, "MAC 8"), (4, "bus")])
+def test_who_breaks_off_its_frame_had_the_token(latency: float, begun: int, named: str):
+    """Six octets of a frame of MAC 8 say whose it is, four do not; then silence, and 1 makes a token."""
+    steps: list[Step] = []
+    for _ in range(2):
+        steps += [*rounds(6, 1, 8, 20), (2, token(1, 8)), (2, data(8, 20)[:begun])]
+        steps += [(520, poll(1, 8)), (4, found(8, 1)), (2, token(1, 8)), (2, token(8, 20)), (2, token(20, 1))]
+    read = script(steps, latency=latency)
+    assert read.of("MS101").subject == named
+
+
 @pytest.mark.parametrize(("silence", "named"), [(1000, "MAC 8"), (1030, "bus"), (1900, "bus")])
 def test_a_silence_that_no_other_master_leaves_names_nobody(silence: float, named: str):
     """MAC 1 makes a token after 510 ms, if it is alive; here it had been off as well."""
