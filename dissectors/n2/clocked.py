@@ -17,6 +17,9 @@ from dissectors.line import MS
 from dissectors.n2.unheard import SOON
 
 LEAST: Final = 20
+MOST: Final = 4096
+"""Of the first so many turns it is told."""
+
 STEADIER: Final = 3
 """So many times less than the pauses vary the steps of a clock."""
 
@@ -38,7 +41,7 @@ class Clocked:
         if self._answered is None:
             return
         (begin, end, answer_end), self._answered = self._answered, None
-        if start - end < SOON:
+        if start - end < SOON and self.steps.count < MOST:
             self.steps.add(start - begin)
             self.pauses.add(start - answer_end)
 

@@ -18,6 +18,7 @@ import numpy as np
 from dissectors import stretches
 from dissectors.columns import NONE, ROLES, VERDICTS
 from dissectors.frame import Frame, Role
+from dissectors.n2.clocked import MOST
 from dissectors.n2.commands import parse_command
 from dissectors.n2.findings import ANSWERS_KEPT, N2Findings, refusal_code
 from dissectors.n2.header import BROADCAST, meant
@@ -150,9 +151,10 @@ class _Judging:
         request, last = found.stretches.request[begin:end], found.stretches.last[begin:end]
         clocked.see_command(int(frames.start[request[0]]))
         begins, ends, answered = frames.start[request], frames.end[request], found.answered[begin:end]
-        soon = answered[:-1] & (begins[1:] - ends[:-1] < SOON)
-        clocked.steps.add_many((begins[1:] - begins[:-1])[soon])
-        clocked.pauses.add_many((begins[1:] - frames.end[last[:-1]])[soon])
+        if room := MOST - clocked.steps.count:
+            soon = np.flatnonzero(answered[:-1] & (begins[1:] - ends[:-1] < SOON))[:room]
+            clocked.steps.add_many((begins[1:] - begins[:-1])[soon])
+            clocked.pauses.add_many((begins[1:] - frames.end[last[:-1]])[soon])
         if answered[-1]:
             clocked.answered(int(begins[-1]), int(ends[-1]), int(frames.end[last[-1]]))
 
