@@ -1,10 +1,17 @@
-"""Chances: how likely it is that so much of what falls anywhere falls on one. Pure."""
+"""Chances: how likely it is that so much of what falls anywhere falls on one, and what is too rare to say. Pure."""
 
 from __future__ import annotations
 
 from math import erfc, exp, lgamma, log, log1p, sqrt
 
 _EXACT_MOST = 400
+
+MINUTE = 60_000_000_000  # ns
+TOLERABLE = 2
+"""Disturbances a minute that Johnson Controls calls tolerable."""
+
+FEW = 100
+"""One in so many is worth a warning, however rare."""
 
 
 def at_least(count: int, of: int, share: float) -> float:
@@ -23,3 +30,12 @@ def at_least(count: int, of: int, share: float) -> float:
         exp(whole - lgamma(k + 1) - lgamma(of - k + 1) + k * hit + (of - k) * missed) for k in range(count, of + 1)
     )
     return min(1.0, sum(terms))
+
+
+def is_rare(count: int, of: int, span: int) -> bool:
+    """Whether so few in `span` ns are not worth a warning: one; or under 1 in 100 and not surely over two a minute.
+
+    Of few counted ones chance makes more: up to four in one minute, eight in two, 28 in ten.
+    """
+    usual = TOLERABLE * max(1, -(-span // MINUTE))
+    return count == 1 or (FEW * count < of and count <= usual + 2 * sqrt(usual))

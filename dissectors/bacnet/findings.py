@@ -7,13 +7,15 @@ from collections.abc import Iterable
 from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.findings_of_damage import damage, duplicates
-from dissectors.bacnet.findings_of_hearing import TRUSTED, hasty, hearing, takes_unheard, unheard_share
+from dissectors.bacnet.findings_of_hearing import TRUSTED, hearing, takes_unheard, unheard_share
 from dissectors.bacnet.findings_of_refusals import REFUSED_KEPT, Refusals
+from dissectors.bacnet.findings_of_tokens import silences, tokens
 from dissectors.bacnet.findings_of_use import polls, use
-from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_ALL_SILENT, T_REPLY_DELAY, T_USAGE_DELAY
-from dissectors.bacnet.ring import COARSE_LIMIT, Happened, Ring, RingEventKind, RingNode, lies_between
+from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
+from dissectors.bacnet.ring import COARSE_LIMIT, Ring, RingEventKind, RingNode, lies_between
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.bacnet.rules import RULES
+from dissectors.chances import is_rare
 from dissectors.findings import Finding, Severity, as_consequence, counted, times
 from dissectors.frame import Event, Header
 from dissectors.line import Timing
@@ -27,9 +29,6 @@ ALL_LATE = 4
 """A station is named for slow uses of the token where its share is so many times that of the others: what hits all of
 them in the same way is a busy computer."""
 
-STRAYS_SHARE = 0.2
-"""Of a second token is spoken where it shows itself so many times for each frame that the tap did not hear."""
-
 USED_BOTH_LEAST = 3
 USED_BOTH_SHARE = 0.5
 LIKE_USUAL = 4
@@ -38,9 +37,6 @@ often than after other tokens."""
 
 POSTPONED_SHARE = 0.1
 LEAST_USES = 20
-ALONE_POLLS = 2 * MAX_MASTER
-"""A first search for a successor takes at most MAX_MASTER polls."""
-
 SKIPPED_ROUNDS = 20
 """So many tokens past a station that is in the ring, and not one poll to it, are no accident."""
 
@@ -66,7 +62,8 @@ _TIMED: tuple[tuple[str, RingEventKind, int, str], ...] = (
 def judge(ring: Ring) -> tuple[Finding, ...]:
     """All findings about a ring, the gravest first, consequences as notes that name their cause."""
     made = [
-        *_tokens(ring),
+        *tokens(ring),
+        *silences(ring),
         *_holders(ring),
         *_counted(ring),
         *_times(ring),
@@ -105,62 +102,6 @@ def _under_causes(made: list[Remark]) -> Iterable[Finding]:
             ):
                 explained[id(one)] = as_consequence(one.finding, cause.finding, RULES)
     return (explained.get(id(one), one.finding) for one in made)
-
-
-def _comes_back(ring: Ring, mac: int, left: int) -> bool:
-    """Whether a station that was away before has not been away clearly longer yet, at the end of what was heard."""
-    leaves = [event.time for event in ring.of(RingEventKind.LEFT, mac).events]
-    returns = [event.time for event in ring.of(RingEventKind.REJOINED, mac).events]
-    away = [back - max(before) for back in returns if (before := [time for time in leaves if time < back])]
-    return bool(away) and (ring.last or left) - left <= 2 * max(away)
-
-
-def _tokens(ring: Ring) -> Iterable[Remark]:
-    for (what, mac), happened in ring.happened.items():
-        if what is RingEventKind.LOST_TOKEN:
-            longest = max((event.value or 0 for event in happened.events), default=0)
-            makers = sorted({event.other for event in happened.events if event.other is not None})
-            held = f"MAC {mac} had it" if mac is not None else _unheld(happened)
-            grave = None if mac is not None else Severity.WARNING if happened.count > 1 else Severity.NOTE
-            seen = (
-                f"the token was lost {times(happened.count)}; {held}; silence up to {measured(longest)}; "
-                f"begun anew by MAC {listed(makers)}"
-            )
-            yield of("MS101", mac, seen, happened, grave)
-        elif (
-            what is RingEventKind.LEFT
-            and mac is not None
-            and ring.of(RingEventKind.REJOINED, mac).last <= happened.last
-        ):
-            node = ring.nodes.get(mac)
-            gone = node is not None and max(node.last, node.last_token) <= happened.last
-            if gone and not _comes_back(ring, mac, happened.last):
-                seen = "did not use its token, was passed over, and has been silent since"
-                yield of("MS106", mac, seen, happened)
-    strays = [happened for (what, _), happened in ring.happened.items() if what is RingEventKind.TWO_TOKENS]
-    strays += hasty(ring).values()
-    total = sum(happened.count for happened in strays)
-    if total >= 2 and ring.shows_tokens and total > STRAYS_SHARE * unheard_share(ring) * ring.frames:
-        together = strays[0]
-        for happened in strays[1:]:
-            together = together.merge(happened)
-        who = sorted({event.mac for event in together.events if event.mac is not None})
-        seen = f"MAC {listed(who)} sent {times(total)} while another one had the token"
-        yield Remark(who[0] if len(who) == 1 else None, of("MS104", None, seen, together).finding)
-    for mac, node in ring.nodes.items():
-        if node.polls_sent > ALONE_POLLS and not node.tokens_sent and not node.tokens_received:
-            yield plain("MS109", ring, mac, f"{counted(node.polls_sent, 'poll')} for masters and not one token")
-
-
-def _unheld(happened: Happened) -> str:
-    """Why no station is named for lost tokens."""
-    of_all = sum((event.value or 0) >= T_ALL_SILENT for event in happened.events)
-    all_silent = (
-        f"all stations were silent together, longer than {measured(T_ALL_SILENT)}, which no master that is alive "
-        "leaves: their supply, the line or the tap"
-    )
-    disturbed = "who had it is not known, or octets that are no good frame came first"
-    return all_silent if of_all == len(happened.events) else f"{disturbed}; or {all_silent}" if of_all else disturbed
 
 
 def _holders(ring: Ring) -> Iterable[Remark]:
@@ -230,7 +171,7 @@ def _counted(ring: Ring) -> Iterable[Remark]:
                 node = ring.nodes.get(mac) if mac is not None else None
                 if code == "MS102" and (happened.count == 1 or _share(happened.count, node) < least_share):
                     severity = Severity.NOTE
-                if code == "MS301" and happened.count == 1:
+                if code == "MS301" and is_rare(happened.count, node.requests_received if node else 0, ring.span):
                     severity = Severity.NOTE
                 seen = words.format(times=times(happened.count), requests=counted(happened.count, "request"))
                 # a forbidden address is the sender's affair, and may stand for no station
@@ -249,8 +190,11 @@ def _times(ring: Ring) -> Iterable[Remark]:
             if what is kind:
                 most = max((event.value or 0 for event in happened.events), default=0)
                 seen = words.format(times=times(happened.count), most=measured(most))
-                answers = 0 if mac is None or mac not in ring.nodes else ring.nodes[mac].replies
-                rare = what is RingEventKind.LATE_REPLY and happened.count < TRUSTED * unheard_share(ring) * answers
+                node = ring.nodes.get(mac, RingNode()) if mac is not None else RingNode()
+                is_reply = what is RingEventKind.LATE_REPLY
+                answers = node.replies if is_reply else node.poll_replies_sent
+                unheard = is_reply and happened.count < TRUSTED * unheard_share(ring) * answers
+                rare = unheard or is_rare(happened.count, answers, ring.span)
                 yield of(code, mac, seen, happened, Severity.NOTE if rare else None, pair=True)
     yield from _late_uses(ring)
 

@@ -8,6 +8,7 @@ from math import sqrt
 from dissectors.bacnet.findings_of_use import has_two_rhythms
 from dissectors.bacnet.ring import Happened, Ring, RingEventKind, RingNode
 from dissectors.bacnet.ring_remarks import Remark, listed, of, plain
+from dissectors.chances import is_rare
 from dissectors.findings import Severity, counted, times
 
 DAMAGED_LEAST = 3
@@ -35,7 +36,8 @@ def damage(ring: Ring) -> Iterable[Remark]:
             f"{damaged} of {counted(ring.frames, 'frame')} damaged: "
             f"{', '.join(f'{count} {what}' for count, what in kinds if count)}"
         )
-        yield plain("MS401", ring, None, seen, damaged)
+        severity = Severity.NOTE if is_rare(damaged, ring.frames, ring.span) else None
+        yield plain("MS401", ring, None, seen, damaged, severity)
     for mac, node in ring.nodes.items():
         if node.damaged >= DAMAGED_LEAST and _is_its_own(ring, node):
             yield from _of_one(ring, mac, node)

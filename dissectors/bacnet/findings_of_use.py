@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from dissectors.bacnet.limits import N_POLL, T_USAGE_TIMEOUT_MAX
-from dissectors.bacnet.ring import Ring, RingEventKind
+from dissectors.bacnet.ring import Ring, RingEventKind, RingNode
 from dissectors.bacnet.ring_questions import T_GO_ON
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
-from dissectors.findings import Severity, counted, times
+from dissectors.bacnet.rules import RULES
+from dissectors.findings import Severity, as_consequence, counted, times
 from dissectors.line import NS_PER_S
 
 POLLS_SHARE = 0.1
@@ -33,10 +34,13 @@ STRETCHED = 5
 def polls(ring: Ring) -> Iterable[Remark]:
     """Too many polls for masters, searches that stop the bus, and polls that wait too long or too short."""
     advice = {int(words.split()[1]): words for words in ring.advice()}
+    together = _who_poll_alike(ring)
+    whole = _of_all_who_poll(ring, together) if together else None
+    if whole is not None:
+        yield whole
     for mac, node in ring.nodes.items():
-        seen, tokens = [], node.tokens_received
-        made = node.polls_sent - node.polls_of_search
-        if made >= LEAST_POLLS and tokens and made > POLLS_SHARE * tokens:
+        seen, tokens, made = [], node.tokens_received, _polls_made(node)
+        if _polls_too_often(node):
             seen.append(
                 f"{made} polls to {tokens} tokens (one in {N_POLL} is usual), {min(made, node.polls_unanswered)} "
                 "of them "
@@ -53,8 +57,37 @@ def polls(ring: Ring) -> Iterable[Remark]:
             )
         if seen:
             words = "; ".join(seen)
-            yield plain("MS201", ring, mac, f"{words}; {advice[mac]}" if mac in advice else words, made)
+            remark = plain("MS201", ring, mac, f"{words}; {advice[mac]}" if mac in advice else words, made)
+            if whole is not None and mac in together and stopped.count <= 1:
+                remark = Remark(mac, as_consequence(remark.finding, whole.finding, RULES))
+            yield remark
     yield from _waits(ring)
+
+
+def _polls_made(node: RingNode) -> int:
+    """Polls for a new master; those of a search for a lost one are not counted."""
+    return node.polls_sent - node.polls_of_search
+
+
+def _polls_too_often(node: RingNode) -> bool:
+    tokens, made = node.tokens_received, _polls_made(node)
+    return made >= LEAST_POLLS and tokens > 0 and made > POLLS_SHARE * tokens
+
+
+def _who_poll_alike(ring: Ring) -> frozenset[int]:
+    """Masters that poll too often, where they are several, and half of all: one setting or make, told once."""
+    often = frozenset(mac for mac, node in ring.nodes.items() if _polls_too_often(node))
+    return often if len(often) > 1 and 2 * len(often) >= len(ring.masters) else frozenset()
+
+
+def _of_all_who_poll(ring: Ring, who: frozenset[int]) -> Remark:
+    nodes = [ring.nodes[mac] for mac in who]
+    made, tokens = sum(map(_polls_made, nodes)), sum(node.tokens_received for node in nodes)
+    seen = (
+        f"MAC {listed(sorted(who))} poll alike: {made} polls to {tokens} tokens (one in {N_POLL} is usual); unanswered "
+        f"polls of all stations take {ring.poll_waste_share:.0%} of the time"
+    )
+    return plain("MS201", ring, None, seen, made)
 
 
 def _waits(ring: Ring) -> Iterable[Remark]:

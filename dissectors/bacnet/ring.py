@@ -27,6 +27,7 @@ class RingEventKind(Enum):
     """Kinds of events on a ring."""
 
     LOST_TOKEN = "lost token"  # silence of 500 ms and more, then somebody began anew
+    ALL_SILENT = "all silent"  # the same silence, then the ring went on where it was
     RETRY = "token repeated"
     TWO_TOKENS = "sent without having the token"
     REJOINED = "answered a poll though already in the ring"

@@ -18,12 +18,12 @@ from dissectors.bacnet.limits import (
     BROADCAST,
     MAX_MASTER,
     N_MIN_OCTETS,
-    T_ALL_SILENT,
     T_NO_TOKEN,
     T_USAGE_DELAY,
     T_USAGE_TIMEOUT,
     TURNAROUND_BITS,
 )
+from dissectors.bacnet.lost_tokens import breaks_off, longest_wait, makes_token
 from dissectors.bacnet.repeated_token import RepeatedToken
 from dissectors.bacnet.ring import Ring, RingEvent, RingEventKind
 from dissectors.bacnet.ring_addresses import check_addresses, see_i_am
@@ -70,6 +70,7 @@ class MstpRingObserver:
         self._got: int | None = None  # when the holder got the token
         self._hold = 0  # data frames sent on this token
         self._doubt = True  # something may have been missed since the last good frame
+        self._broke_off = False  # that is a frame of the holder that was cut short, and nothing else
         self._before: Frame | None = None  # the last good frame
         self._quiet_since: int | None = None  # end of the last event of any kind
         self._quiet_slack = 0  # of the last event
@@ -100,7 +101,7 @@ class MstpRingObserver:
                 if len(event.octets) >= N_MIN_OCTETS:  # fewer prove nothing: who was asked may still answer
                     self._questions.asked = None
                     self._disturb(no, event.start)
-                self._doubt = True
+                self._doubt, self._broke_off = True, False
             else:
                 self._see_hole(event.start)
         else:
@@ -144,13 +145,14 @@ class MstpRingObserver:
         self._repeated.forget()
         self._questions.forget()
         self._reads.forget()
-        self._doubt = True
+        self._doubt, self._broke_off = True, False
         self._tally.hole = max(self._tally.hole, end)
         for node in self._tally.nodes.values():
             node.got = node.searching_since = None
 
     def _see_damage(self, no: int, frame: Frame, header: Header) -> None:
         tally, asked = self._tally, self._questions.asked
+        self._broke_off = not self._doubt and breaks_off(frame, self._holder)
         speaker = speaker_of(frame, header, self._turn)
         count_damage(tally, frame, None if self._disturb(no, frame.start) else speaker)
         self._questions.asked = None
@@ -285,12 +287,22 @@ class MstpRingObserver:
             tally.note(RingEventKind.UNHEARD, frame.start, no, frame.octets[3], source)
         elif tally.edges:  # where no token was ever seen, none can be lost
             silence = self._silence(frame)
-            # so long a silence has no master alive in it: what all of them share failed, or the tap, and no holder
-            unknown = self._doubt or self._was_interrupted() or silence >= T_ALL_SILENT
-            holder = None if unknown else self._holder
-            tally.note(RingEventKind.LOST_TOKEN, frame.start, no, holder, source, silence)
-            begin_search(tally.node(source), frame.start)
+            if not makes_token(frame):
+                tally.note(RingEventKind.ALL_SILENT, frame.start, no, None, source, silence)
+            else:
+                disturbed = (self._doubt and not self._broke_off) or self._was_interrupted()
+                unknown = disturbed or self._were_all_silent(silence - frame.slack)
+                holder = None if unknown else self._holder
+                tally.note(RingEventKind.LOST_TOKEN, frame.start, no, holder, source, silence)
+                begin_search(tally.node(source), frame.start)
         self._forget()
+
+    def _were_all_silent(self, silence: int) -> bool:
+        """Whether no other master that the ring has can have been alive all the time."""
+        others = (
+            mac for mac, node in self._tally.nodes.items() if node.tokens_sent and not node.gone and mac != self._holder
+        )
+        return silence >= longest_wait(others)
 
     def _was_interrupted(self) -> bool:
         """Whether the last good frame was neither by nor for the holder of the token, who may have let go of it then.

@@ -15,8 +15,9 @@ _ALL = (
         Severity.ERROR,
         "lost token",
         "Nothing was sent for 500 ms (Tno_token) and then a station began anew: the token was lost "
-        "(ASHRAE 135, 9.5.6). The one with the lowest address begins first, 10 ms (Tslot) per address later, so that "
-        "2 s of silence are of all stations together, and nobody is named for them. Only where tokens are in the "
+        "(ASHRAE 135, 9.5.6). It looks for a successor then: where the ring goes on with anything else, no token was "
+        "lost. The one with the lowest address begins first, 10 ms (Tslot) per address later, so that a silence of "
+        "twice that time is of all stations together. Nobody is named for either. Only where tokens are in the "
         "capture.",
         "the station that had the token was reset, switched off or disturbed while it passed the token on",
         "power and wiring of the last holder; noise at that moment; whether it answers Test Request",
@@ -127,7 +128,8 @@ _ALL = (
         "too many polls for masters",
         "A station polls for a new master once in 50 tokens (Npoll); more than one in 10 is counted here, "
         "with the share of time that unanswered polls take. Polls of a search for a successor, the first one or a lost "
-        "one, do not count; but searches after a loss that stopped the bus for over a second are said, with "
+        "one, do not count. Where half of all masters do so, and two at least, it is one finding about the bus, and "
+        "theirs are noted under it. But searches after a loss that stopped the bus for over a second are said, with "
         "their cost.",
         "a station that does not count to Npoll, or polls far beyond the last address",
         "Max_Master and firmware of the stations named; gaps in the addresses",
@@ -136,7 +138,7 @@ _ALL = (
         "MS202",
         Severity.WARNING,
         "slow to answer a poll",
-        "A Reply To Poll For Master came later than 15 ms (Tusage_delay) after the poll.",
+        "A Reply To Poll For Master came later than 15 ms (Tusage_delay) after the poll. A single one is only noted.",
         "the station risks not being taken into the ring",
         "load and firmware of the station",
     ),
@@ -164,7 +166,8 @@ _ALL = (
         "MS301",
         Severity.WARNING,
         "no answer",
-        "A Data Expecting Reply was followed neither by data nor by Reply Postponed. A single one is only noted.",
+        "A Data Expecting Reply was followed neither by data nor by Reply Postponed. A single one, or fewer than 1 "
+        "in 100 and not surely over two a minute, is only noted.",
         "the station is off, busy or at another address; or the answer was lost on the line",
         "whether it answers other requests; damaged frames at the same time",
     ),
@@ -172,7 +175,8 @@ _ALL = (
         "MS302",
         Severity.WARNING,
         "late answer",
-        "An answer came later than 250 ms (Treply_delay) after the request; the asker gives up at 255 … 300 ms.",
+        "An answer came later than 250 ms (Treply_delay) after the request; the asker gives up at 255 … 300 ms. "
+        "A single one, or fewer than 1 in 100 and not surely over two a minute, is only noted.",
         "the station should send Reply Postponed; its late answer collides with the next token",
         "load and firmware of the station",
     ),
@@ -209,7 +213,8 @@ _ALL = (
         "MS401",
         Severity.WARNING,
         "damaged frames",
-        "Frames whose header or data CRC is wrong, or that end early, more than one in 1000 and at least three.",
+        "Frames whose header or data CRC is wrong, or that end early, more than one in 1000 and at least three. Fewer "
+        "than 1 in 100 and not surely over two a minute are only noted.",
         "noise, collisions, wrong termination or bias, or two stations that send at once",
         _WIRING,
     ),

@@ -6,10 +6,11 @@ from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from dissectors.chances import is_rare
 from dissectors.findings import Tally
 from dissectors.frame import Flaw
 from dissectors.late_speakers import LateSpeakers
-from dissectors.line import MS, NS_PER_S, Timing
+from dissectors.line import MS, Timing
 from dissectors.modbus.station_record import Cycles, StationRecord
 from dissectors.strikes import Strikes
 
@@ -218,9 +219,8 @@ class BusRecord:
         return by_sender.setdefault(sender, Tally())
 
     def rare(self, count: int, of: int) -> bool:
-        """Whether so few are not worth a warning: one, or under 1 in 100 and at most two a minute."""
-        minutes = max(1, -(-self.span // (60 * NS_PER_S)))
-        return count == 1 or (count <= 2 * minutes and 100 * count < of)
+        """Whether so few are not worth a warning."""
+        return is_rare(count, of, self.span)
 
 
 def _usual(station: StationRecord) -> int:

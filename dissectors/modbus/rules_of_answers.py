@@ -25,7 +25,7 @@ ANSWER_RULES = (
         "Requests that no octet followed before the master went on, to a station that answers others; not those that "
         "were answered late, nor what stands at the border of a silence that is far longer than any wait of the master "
         "(30 times its pauses, twice the slowest answer, 3 s or more). A single one, or fewer than 1 in 100 and "
-        "at most two a minute, is only noted.",
+        "not surely over two a minute, is only noted.",
         "requests or answers get lost: a loose wire, a missing ground, a station too busy to answer",
         "whether requests or answers are damaged at the same times; the station's terminals and supply",
         explains=("MB104",),
@@ -53,7 +53,7 @@ ANSWER_RULES = (
         Severity.WARNING,
         "damaged answers",
         "Answers with a wrong check or length, or octets in place of an answer that are no frame. Counted at the "
-        "station that was asked. A single one, or fewer than 1 in 100 and at most two a minute, is only noted.",
+        "station that was asked. A single one, or fewer than 1 in 100 and not surely over two a minute, is only noted.",
         "noise on this station's drop: a long stub, a bad connector, its driver",
         "termination and bias; this station's connector and stub; its distance from power cables",
         explains=("MB002", "MB104"),

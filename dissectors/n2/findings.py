@@ -15,6 +15,7 @@ from dissectors.findings import Finding, Tally
 from dissectors.frame import Damage, Event, Frame, Header, Noise
 from dissectors.late_speakers import Due, LateSpeakers, reaching
 from dissectors.line import Timing
+from dissectors.n2.clocked import Clocked
 from dissectors.n2.commands import parse_command
 from dissectors.n2.envelope import check_off
 from dissectors.n2.header import meant
@@ -53,6 +54,7 @@ class N2Findings:
         self._asked: dict[int, OpenCommand] = {}  # by transaction
         self.masters = Masters()
         self.patience = Patience()
+        self.clocked = Clocked()
         self.torn = TornFrames(timing)
         self.strikes = Strikes()
         self.late_speakers = LateSpeakers()
@@ -84,6 +86,7 @@ class N2Findings:
 
     def _see_command(self, no: int, event: Frame, header: Header, placement: Placement) -> None:
         asked = OpenCommand(no, event, parse_command(meant(event)))
+        self.clocked.see_command(event.start)
         before, last = self.masters.last_station, self.masters.newest
         self.masters.see_command(asked, self.stations.get(before) if before is not None else None)
         self._asked[placement.tx] = asked
@@ -188,6 +191,7 @@ class N2Findings:
         elif not asked.frame.ok:  # understood all the same, or refused for it
             self.late_speakers.damaged_request(b"", transaction.start, transaction.request)
         else:
+            self.clocked.answered(asked.frame.start, asked.frame.end, transaction.end)
             self.late_speakers.answered(transaction.station or 0, f"station {transaction.station}", transaction.start)
         station.answered += 1
         self._judge_latency(station, transaction)
@@ -207,8 +211,9 @@ class N2Findings:
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far: the bus first, then station by station."""
-        seconds = (self.now - (self.first or 0)) / 1e9
-        heard = N2Evidence(self.now, seconds, self.master, self.stations, self.masters.seen, self._stray, self.strikes)
+        span = self.now - (self.first or 0)
+        masters, clocked = self.masters.seen, self.clocked.is_sure
+        heard = N2Evidence(self.now, span, self.master, self.stations, masters, self._stray, self.strikes, clocked)
         found = (reaching(one, self.late_speakers) if one.code == "N2011" else one for one in worded(heard))
         return (*found, *of_late_speakers(heard, self.late_speakers))
 

@@ -18,11 +18,12 @@ import numpy as np
 from dissectors import stretches
 from dissectors.columns import NONE, ROLES, VERDICTS
 from dissectors.frame import Frame, Role
+from dissectors.n2.clocked import MOST
 from dissectors.n2.commands import parse_command
 from dissectors.n2.findings import ANSWERS_KEPT, N2Findings, refusal_code
 from dissectors.n2.header import BROADCAST, meant
 from dissectors.n2.masters import HASTE, OpenCommand
-from dissectors.n2.unheard import ONLY_LOOKS
+from dissectors.n2.unheard import ONLY_LOOKS, SOON
 from dissectors.n2.wording import SLOW
 from dissectors.row_columns import in_turn
 from dissectors.tracker import Verdict
@@ -140,8 +141,22 @@ class _Judging:
             self._see_event(at)
         self._see_late(begin, end)
         judge.newest = int(frames.start[stretch.stop - 1])
+        self._see_rhythm(begin, end)
         self._keep_answers(begin, end)
         judge.turn = int(self.found.unit[end - 1])
+
+    def _see_rhythm(self, begin: int, end: int) -> None:
+        """How steady the master's steps and pauses are."""
+        clocked, found, frames = self._judge.clocked, self.found, self._rows.frames
+        request, last = found.stretches.request[begin:end], found.stretches.last[begin:end]
+        clocked.see_command(int(frames.start[request[0]]))
+        begins, ends, answered = frames.start[request], frames.end[request], found.answered[begin:end]
+        if room := MOST - clocked.steps.count:
+            soon = np.flatnonzero(answered[:-1] & (begins[1:] - ends[:-1] < SOON))[:room]
+            clocked.steps.add_many((begins[1:] - begins[:-1])[soon])
+            clocked.pauses.add_many((begins[1:] - frames.end[last[:-1]])[soon])
+        if answered[-1]:
+            clocked.answered(int(begins[-1]), int(ends[-1]), int(frames.end[last[-1]]))
 
     def _count(self, which: slice) -> None:
         """What is counted of commands and answers, by station."""

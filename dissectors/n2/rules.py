@@ -31,8 +31,8 @@ RULES: dict[str, Rule] = {
             "slow station",
             "Time from the end of a command to the begin of its answer, over 250 ms even when all that the adapter may "
             "have added is taken off. 250 ms is the shortest message timeout of an NAE; the standard's own limit is "
-            "not public. Only a note where no answer of it came too late for the master, or where fewer than 1 in 100 "
-            "are slow: a busy computer explains those.",
+            "not public. Only a note where no answer of it came too late for the master, or only one, or so few as in "
+            "N2004, or where so few are slow: a busy computer, or one pause of the whole bus, explains those.",
             "a station busy with other work, or a gateway in between",
             "raise the master's message timeout, or relieve the station",
             explains=("N2005", "N2011"),
@@ -45,8 +45,8 @@ RULES: dict[str, Rule] = {
             "address and is counted at the station that was asked. A sender is named that has over four times the "
             "damage that noise at the rate of all others would have done while it sends, or all of it where chance "
             "would seldom have struck it alone; up to four in a row with no whole answer between count as one, for a "
-            "master repeats into the same disturbance. Else it is the bus's. One alone, or fewer than 1 in 100 and at "
-            "most two a minute, is only noted: Johnson Controls calls up to two a minute tolerable.",
+            "master repeats into the same disturbance. Else it is the bus's. One alone, or fewer than 1 in 100 and "
+            "not surely over two a minute, is only noted: Johnson Controls calls up to two a minute tolerable.",
             "noise, wrong termination or bias, or two that talk at once",
             "if one station only: its stub, its connector; if all: termination, bias, ground",
             explains=("N2005", "LN101", "LN103", "LN204"),
@@ -57,8 +57,8 @@ RULES: dict[str, Rule] = {
             "no answer",
             "Commands that no answer followed, not even a late one. An error where the master turned to a station "
             "several times, or over 11 times at once, and got none. A single turn is only noted, or fewer than 1 in "
-            "100 and at most two a minute; and so are many addresses that are only asked who they are: a scan. Where "
-            "several are asked and nobody but the master is heard, one finding names the bus.",
+            "100 and not surely over two a minute; and so are many addresses that are only asked who they are: a scan. "
+            "Where several are asked and nobody but the master is heard, one finding names the bus.",
             "station off, wrong address or wrong baud rate, or a broken wire; all of them: one between them and here",
             "check its supply, address and wiring, and whether the master has its values: then only this tap does not "
             "hear it",
@@ -113,7 +113,8 @@ RULES: dict[str, Rule] = {
             "N2011",
             Severity.WARNING,
             "answer that nobody asked for",
-            "Answers without a command before them, or after the master had gone on.",
+            "Answers without a command before them, or after the master had gone on. A single one, or fewer than 1 in "
+            "100 and not surely over two a minute, is only noted.",
             "a master that is not heard at this place of the bus, or a station far slower than the master's timeout",
             "compare the answer times with the master's timeout; move the tap",
             explains=("N2005", "N2003", "N2015", "LN1", "LN2"),
@@ -138,7 +139,8 @@ RULES: dict[str, Rule] = {
             Severity.WARNING,
             "answer repeated",
             "The same good answer came again to one command, later than an echo would. A single one, or fewer than 1 "
-            "in 100 and at most two a minute, is only noted. It proves no second station: the octets are the same.",
+            "in 100 and not surely over two a minute, is only noted. It proves no second station: the octets are the "
+            "same.",
             "a repeater or converter that gives back what it hears, a station that sends twice, or two stations with "
             "one address that hold the same",
             "switch the station off and see whether something still answers; then the repeater",
@@ -161,8 +163,10 @@ RULES: dict[str, Rule] = {
             "answers not heard here",
             "Commands without an answer, behind which the master asks something else after one try, within three "
             "quarters of the shortest time that it waited before it repeated one (of 250 ms, the least that an NAE can "
-            "be given, where it repeated none). So it had an answer. Asking who is there does not count. A single one, "
-            "or fewer than 1 in 100 and at most two a minute, is only noted.",
+            "be given, where it repeated none). So it had an answer. Asking who is there does not count; nor does "
+            "anything of a master that surely sends by a clock, whose commands follow each other in steadier steps "
+            "than its pauses behind answers are: such a station is N2005. A single one, "
+            "or fewer than 1 in 100 and not surely over two a minute, is only noted.",
             "a tap that does not hear what the master does: behind a repeater, on one pair of a four-wire line, loose; "
             "no station is to blame",
             "move the tap towards the stations that are not heard; where none is, listen on the other pair",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
+from dissectors.chances import is_rare
 from dissectors.findings import Finding, Severity, Tally, counted, times, together
 from dissectors.frame import Flaw
 from dissectors.line import MS, NS_PER_S
@@ -37,20 +38,29 @@ SCAN = 8
 
 @dataclass(frozen=True, slots=True)
 class N2Evidence:
-    """All that was gathered up to `now` (ns) in `seconds`."""
+    """All that was gathered up to `now` (ns), within `span` ns."""
 
     now: int
-    seconds: float
+    span: int
     master: Damages
     stations: Mapping[int, N2StationRecord]
     masters: Tally
     stray: Tally
     strikes: Strikes
+    clocked: bool  # the master sends by a clock: that it goes on says nothing of an answer
+
+    def missing(self, station: N2StationRecord) -> Tally:
+        """Commands to it that no answer followed, as far as is known."""
+        parts = [station.missing.tally(), *([station.unheard.tally()] if self.clocked else [])]
+        return together([one for one in parts if one.count] or parts[:1])
+
+    def unheard(self, station: N2StationRecord) -> Tally:
+        """Commands to it whose answer the master had."""
+        return Tally() if self.clocked else station.unheard.tally()
 
     def is_rare(self, tally: Tally, of: int) -> bool:
-        """Whether so few are not worth a warning: one, or under 1 in 100 and at most two a minute."""
-        minutes = max(1, -(-int(self.seconds) // 60))
-        return tally.count == 1 or (tally.count <= 2 * minutes and 100 * tally.count < of)
+        """Whether so few are not worth a warning."""
+        return is_rare(tally.count, of, self.span)
 
     def noted_if(self, rare: bool, finding: Finding) -> Finding:
         """The finding, only as a note where it is rare."""
@@ -158,7 +168,7 @@ def _flaw_words(flaw: Flaw | int) -> str:
 def _scanned(heard: N2Evidence) -> frozenset[int]:
     """Addresses that are only asked who they are, and are not there, where they are many."""
     absent = [address for address, one in heard.stations.items() if one.asked and not one.answered]
-    scanned = frozenset(a for a in absent if heard.stations[a].only_identify and heard.stations[a].missing.count)
+    scanned = frozenset(a for a in absent if heard.stations[a].only_identify and heard.missing(heard.stations[a]).count)
     return scanned if len(scanned) >= SCAN else frozenset()
 
 
@@ -167,7 +177,7 @@ def _scan(heard: N2Evidence, scanned: frozenset[int]) -> Iterator[Finding]:
         return
     tally = Tally()
     for address in sorted(scanned):
-        one = heard.stations[address].missing.tally()
+        one = heard.missing(heard.stations[address])
         tally.add(one.first, *one.evidence[:1])
         tally.last = max(tally.last, one.last)
     seen = f"{len(scanned)} addresses were asked who they are, and did not answer"
@@ -177,13 +187,15 @@ def _scan(heard: N2Evidence, scanned: frozenset[int]) -> Iterator[Finding]:
 def _only_unheard(heard: N2Evidence) -> frozenset[int]:
     """Stations that are there, and of which this tap hears nothing."""
     return frozenset(
-        address for address, one in heard.stations.items() if not one.answered and one.unheard.count > one.missing.count
+        address
+        for address, one in heard.stations.items()
+        if not one.answered and heard.unheard(one).count > heard.missing(one).count
     )
 
 
 def _unheard(heard: N2Evidence) -> Iterator[Finding]:
     """Answers that the master had, and this tap did not hear."""
-    missed = {address: one.unheard.tally() for address, one in heard.stations.items() if one.unheard.count}
+    missed = {address: tally for address, one in heard.stations.items() if (tally := heard.unheard(one)).count}
     if not missed:
         return
     tally, asked = together(missed.values()), sum(heard.stations[address].asked for address in missed)
@@ -200,20 +212,20 @@ def _silent(heard: N2Evidence, scanned: frozenset[int]) -> frozenset[int]:
         return frozenset()
     if any(one.answered or one.late.count or one.sent.bad.count for one in heard.stations.values()):
         return frozenset()
-    return frozenset(address for address, one in asked.items() if one.missing.count > one.unheard.count)
+    return frozenset(address for address, one in asked.items() if heard.missing(one).count > heard.unheard(one).count)
 
 
 def _nobody(heard: N2Evidence, silent: frozenset[int]) -> Finding:
     """No station is heard: one thing that is wrong, at this place of the bus or behind the master."""
     each = [_missing(heard, "", heard.stations[address]) for address in sorted(silent)]
-    tally = together([heard.stations[address].missing.tally() for address in silent])
+    tally = together([heard.missing(heard.stations[address]) for address in silent])
     asked = sum(heard.stations[address].asked for address in silent)
     seen = f"no answer to any of {asked} commands to {len(silent)} stations: only the master is heard"
     return tally.found(RULES["N2005"], "bus", seen, max(one.severity for one in each))
 
 
 def _missing(heard: N2Evidence, name: str, station: N2StationRecord) -> Finding:
-    tally, rule = station.missing.tally(), RULES["N2005"]
+    tally, rule = heard.missing(station), RULES["N2005"]
     if not station.answered and not station.late.count:
         if station.turns <= 1 and station.asked <= TRIES:
             tries = "the only command" if station.asked == 1 else f"the {station.asked} commands of one turn"
@@ -233,7 +245,7 @@ def _of_station(heard: N2Evidence, name: str, station: N2StationRecord, is_told:
     yield from _points(name, station)
     if station.slow.count:
         yield _slow(heard, name, station)
-    if station.missing.count and not is_told:
+    if heard.missing(station).count and not is_told:
         yield _missing(heard, name, station)
     yield from _overrides(heard, name, station)
     yield from _again(heard, name, station)
@@ -272,7 +284,7 @@ def _slow(heard: N2Evidence, name: str, station: N2StationRecord) -> Finding:
         f"{station.slow.count} of {counted(station.answered, 'answer')} took over {SLOW // MS} ms, "
         f"the longest at least {station.slowest // MS} ms"
     )
-    harmless = not station.late.count or heard.is_rare(station.slow, station.answered)
+    harmless = any(not one.count or heard.is_rare(one, station.answered) for one in (station.late, station.slow))
     return heard.noted_if(harmless, station.slow.found(RULES["N2003"], name, seen))
 
 
@@ -298,4 +310,5 @@ def _again(heard: N2Evidence, name: str, station: N2StationRecord) -> Iterator[F
         yield heard.noted_if(heard.is_rare(station.repeated, station.answered), finding)
     if station.late.count:
         seen = f"{counted(station.late.count, 'answer')} came after the master had gone on"
-        yield station.late.found(RULES["N2011"], name, seen)
+        finding = station.late.found(RULES["N2011"], name, seen)
+        yield heard.noted_if(heard.is_rare(station.late, station.answered), finding)

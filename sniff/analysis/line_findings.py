@@ -8,19 +8,20 @@ from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
+from dissectors.chances import is_rare
 from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, found, times
 from dissectors.frame import Chunk, Damage, Event, Flaw, Frame, LineError, Noise, Place, Reason, Role
 from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction, Verdict
 from dissectors.words import milliseconds
-from sniff.analysis.breaks import breaks_in
+from sniff.analysis.breaks import LEVELS, breaks_in
 from sniff.analysis.judgement import Heard, Judgement
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.line_use import LineUse
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, what_fits
 from sniff.analysis.remains import Remains
-from sniff.analysis.sender_findings import BUS, LEVELS, MASTER, MOST_SENDERS, WRONG, Senders
+from sniff.analysis.sender_findings import BUS, MASTER, MOST_SENDERS, WRONG, Senders
 from sniff.analysis.stray_findings import strays_found
 from sniff.analysis.time_patterns import Stop, TimePatterns
 from sniff.analysis.torn_pieces import TornPieces
@@ -244,7 +245,7 @@ class LineFindings:
         self._pieces.take(sender, event.start, no)
 
     def _see_noise(self, no: int, noise: Noise) -> None:
-        if noise.reason in (Reason.BREAK, Reason.PAD) or breaks_in(noise):
+        if noise.reason is Reason.PAD or breaks_in(noise):
             return
         if self._rows == 1:  # the capture began in the middle of something
             return
@@ -396,9 +397,8 @@ class LineFindings:
         return found(RULES[code], subject, words, first=self._first, last=self._now)
 
     def _note_if(self, count: int, of: int) -> Severity | None:
-        """A note where so few are not worth a warning: one, or under 1 in 100 and at most two a minute."""
-        minutes = max(1, -(-(self._now - self._first) // (60 * NS_PER_S)))
-        return Severity.NOTE if count == 1 or (count <= 2 * minutes and 100 * count < of) else None
+        """A note where so few are not worth a warning."""
+        return Severity.NOTE if is_rare(count, of, self._now - self._first) else None
 
 
 def _sender(row: Row, nouns: Callable[[str], str]) -> str:

@@ -105,12 +105,12 @@ _ALL = (
         Severity.WARNING,
         "parity or framing errors",
         "Octets of frames that the adapter marked, counted at the station that sent the frame (a master's frames at "
-        "the master). A single one, or fewer than 1 frame in 100 and at most two a minute, is only noted. A sender is "
-        "named that is struck clearly more often than the octets that it sends explain (2.5 times the rate of the "
-        "other stations, by chance less than once in a thousand; where nobody else is struck, in twenty), repeats into "
-        "one disturbance counted once; else one finding names the bus. Where one flag covers a whole packet (the "
-        "adapter says so, or in a capture that does not name it the marks: they go on in long runs through good "
-        "frames), damaged frames count, and packets with a flag: a station is named that is in nearly all of them "
+        "the master). A single one, or fewer than 1 frame in 100 and not surely over two a minute, is only noted. "
+        "A sender is named that is struck clearly more often than the octets that it sends explain (2.5 times the "
+        "rate of the other stations, by chance less than once in a thousand; where nobody else is struck, in twenty), "
+        "repeats into one disturbance counted once; else one finding names the bus. Where one flag covers a whole "
+        "packet (the adapter says so, or in a capture that does not name it the marks: they go on in long runs through "
+        "good frames), damaged frames count, and packets with a flag: a station is named that is in nearly all of them "
         "while the others are mostly in packets without one.",
         "noise while this station sends, weak levels from it, or two that send at once",
         "this station's connector, stub and ground; " + _WIRING,
@@ -130,9 +130,10 @@ _ALL = (
         "breaks",
         "The line was held low for longer than a character. Counted are disturbances: all within 250 ms of the first "
         "are one. One, all within one second, or few (as in LN101) are only noted. Where at least four, and 8 in 10 "
-        "of them, begin in or directly after the frames of one station, far more than its share, that station is "
-        "named. No break is a zero octet among others that are no frame, or in a good frame: so sounds another baud "
-        "rate or format.",
+        "of them, begin in or directly after the frames of one station, far more than its share, and hold the line "
+        "low three times at most, that station is named: longer ones are somebody's talk, behind it by time alone. No "
+        "break is a zero octet among others that are no frame, or in a good frame: so sounds another baud rate or "
+        "format.",
         "no fail-safe bias while nobody drives the line, A and B swapped at one device, or a short circuit",
         "bias resistors at one place of the line; A and B of devices added last",
         told_by=_DAMAGED,
@@ -152,9 +153,9 @@ _ALL = (
         Severity.WARNING,
         "stray octets before frames",
         "One to three octets that are no frame directly before a frame, counted at the station that sent the frame. A "
-        "single one, or fewer than 1 frame in 100 and at most two a minute, is only noted. A sender is named that has "
-        "clearly more of them than its share of the frames; what falls before everybody's frames is the bus's, told "
-        "once, and what falls anywhere is LN203.",
+        "single one, or fewer than 1 frame in 100 and not surely over two a minute, is only noted. A sender is "
+        "named that has clearly more of them than its share of the frames; what falls before everybody's frames is the "
+        "bus's, told once, and what falls anywhere is LN203.",
         "the driver is switched on too late or the line floats until then; weak bias",
         "the turnaround of that station; bias; its converter's direction control",
         explains=("LN204",),
@@ -174,8 +175,8 @@ _ALL = (
         Severity.WARNING,
         "stray octets in silence",
         "One to three octets that are no frame, with silence on both sides, or anywhere, whoever sends before or "
-        "after. A single one, or fewer than 1 to 100 frames and at most two a minute, is only noted; so is what comes "
-        "in place of the answers of one station, at that station.",
+        "after. A single one, or fewer than 1 to 100 frames and not surely over two a minute, is only noted; so is "
+        "what comes in place of the answers of one station, at that station.",
         "the line floats when nobody drives it: no or weak fail-safe bias; or noise coupled in",
         "bias at one place of the line; the cable's way along power lines and motors",
         explains=("LN204",),

@@ -26,9 +26,6 @@ BREAKS_LEAST = 4
 NEAR = 12
 """Characters behind a frame within which a break belongs to whoever sent it."""
 
-LEVELS = frozenset((0x00, 0x80, 0xC0, 0xE0, 0xF0, 0xF8, 0xFC, 0xFE, 0xFF))
-"""Octets that one change of the level makes."""
-
 PACKETS_LEAST = 4
 ALL_STRUCK = 8
 """Frames of one sender, all of them good and each with line errors, that no noise makes."""
@@ -53,7 +50,6 @@ class Sender:
     at: Counter[str] = field(default_factory=Counter)  # place of the wrong octets in the frame
     stray: dict[str, Tally] = field(default_factory=dict)  # by rule
     values: Counter[tuple[str, int]] = field(default_factory=Counter)  # of those octets, by rule
-    breaks: Tally = field(default_factory=Tally)  # disturbances in its frames, or directly after one
 
 
 class Senders:
@@ -124,7 +120,7 @@ class Senders:
             self._spoilt.struck(name)
             sender.spoilt.add(frame.start, no)
         if self.breaks.begun_by == no:
-            sender.breaks.add(frame.start, no)
+            self.breaks.begin_behind(name)
         self.before, self._end = name, frame.end
         return sender
 
@@ -152,7 +148,7 @@ class Senders:
         count = self.breaks.see(no, event)
         is_own = count and self.breaks.begun_by == no and not isinstance(event, Frame)  # a frame is counted with it
         if is_own and self.before is not None and event.start - self._end <= self._near:
-            self.of(self.before).breaks.add(event.start, no)
+            self.breaks.begin_behind(self.before)
         return count
 
     def stray(self, name: str, code: str, no: int, noise: Noise) -> None:
@@ -296,7 +292,8 @@ class Senders:
         if not self.breaks.events.count:
             return
         count, severity = self.breaks.events.count, self.breaks.severity(note_if, self.frames)
-        own = {name: (one.breaks.count, float(one.frames)) for name, one in self.by_name.items()}
+        breaks = self.breaks.own
+        own = {name: (breaks[name], float(one.frames)) for name, one in self.by_name.items()}
         for name in standing_out(own):
             struck = own[name][0]
             if severity is None and struck >= max(BREAKS_LEAST, 0.8 * count) and name not in (BUS, MASTER):

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, times, together
+from sniff.analysis.breaks import LEVELS
 from sniff.analysis.line_rules import LINE_RULES as RULES
-from sniff.analysis.sender_findings import BUS, LEVELS, MASTER, NoteIf, Senders
+from sniff.analysis.sender_findings import BUS, MASTER, NoteIf, Senders
 from sniff.analysis.shares import standing_out
 
 INSTEAD_LEAST, INSTEAD = 3, 0.7

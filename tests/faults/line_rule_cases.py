@@ -44,6 +44,9 @@ LINE_RULE_CASES: tuple[Case, ...] = (
     Case(
         "line, silent for a while, MS/TP", mstp, (("LN304", "bus"),), hear=partial(paused, ((20.0, 12.0),)), seconds=40
     ),
+    Case(
+        "line, silent for a moment, MS/TP", mstp, (("MS101", "bus"),), hear=partial(paused, ((20.0, 1.2),)), seconds=40
+    ),
     Case("line, silent for a while, N2", n2, (("LN304", "bus"),), hear=partial(paused, ((20.0, 12.0),)), seconds=40),
     Case(
         "line, silent for a while, PROFIBUS",

@@ -81,7 +81,7 @@ RING_CASES: tuple[Case, ...] = (
     Case(
         "MS/TP too many polls",
         partial(mstp, polls_every=4),
-        (("MS201", "MAC 9"),),
+        (("MS201", "bus"), ("MS201", "MAC 9")),
         struck=("MAC 2", "MAC 5"),
     ),
     Case(

@@ -27,8 +27,8 @@ def memory(thing: Any) -> Any:
 
 
 def _in_any_order(name: str, value: Any) -> Any:
-    """Of what is only ever asked for by sender or station the order says nothing."""
-    return sorted(value, key=repr) if name in _BY_SENDER and isinstance(value, list) else value
+    """Of what is only ever asked for by sender, station or bucket the order says nothing."""
+    return sorted(value, key=repr) if name in _BY_KEY and isinstance(value, list) else value
 
 
-_BY_SENDER = ("spacing", "close", "paused", "_times")
+_BY_KEY = ("spacing", "close", "paused", "_times", "buckets", "tops")

@@ -315,6 +315,34 @@ def test_a_lost_token_through_an_adapter_that_holds_reads_back(silence: float):
     assert "MS104" not in {code for code, _ in read.graves()}
 
 
+@pytest.mark.parametrize("silence", [600, 1900, 5000])
+def test_a_ring_that_goes_on_where_it_was_has_lost_no_token(silence: float):
+    """Whoever makes a token looks for a successor first; here all were silent, or the tap was deaf."""
+    for then in ([(silence, token(8, 20))], [(silence, token(20, 1)), (2, token(1, 8)), (2, token(8, 20))]):
+        read = script([*rounds(6, 1, 8, 20), (2, token(1, 8)), *then, *rounds(6, 20, 1, 8)])
+        assert {code for code, _ in read.graves()} <= {"LN304"}
+        assert "went on where it was" in read.of("MS101").seen
+        assert read.of("MS101").subject == "bus"
+
+
+@pytest.mark.parametrize("latency", [0, 17.5])
+@pytest.mark.parametrize(("begun", "named"), [(6, "MAC 8"), (4, "bus")])
+def test_who_breaks_off_its_frame_had_the_token(latency: float, begun: int, named: str):
+    """Six octets of a frame of MAC 8 say whose it is, four do not; then silence, and 1 makes a token."""
+    steps: list[Step] = []
+    for _ in range(2):
+        steps += [*rounds(6, 1, 8, 20), (2, token(1, 8)), (2, data(8, 20)[:begun])]
+        steps += [(520, poll(1, 8)), (4, found(8, 1)), (2, token(1, 8)), (2, token(8, 20)), (2, token(20, 1))]
+    read = script(steps, latency=latency)
+    assert read.of("MS101").subject == named
+
+
+@pytest.mark.parametrize(("silence", "named"), [(1000, "MAC 8"), (1030, "bus"), (1900, "bus")])
+def test_a_silence_that_no_other_master_leaves_names_nobody(silence: float, named: str):
+    """MAC 1 makes a token after 510 ms, if it is alive; here it had been off as well."""
+    assert script(lost(silence, 1, 8)).of("MS101").subject == named
+
+
 def test_a_silence_that_cannot_be_500_ms_loses_no_token():
     """At 470 ms it is a second token, whatever the adapter does."""
     read = script(lost(470, 20), latency=17.5)

@@ -223,9 +223,17 @@ def test_a_second_token():
 
 def test_too_many_polls():
     heard = run(ring(polls_every=4), 15)
-    finding = heard.finding("MS201")
-    assert finding.subject == "MAC 2"
-    assert "one in 50 is usual" in finding.seen
+    told = [finding for finding in heard.findings if finding.code == "MS201"]
+    assert [(one.subject, one.severity) for one in told if one.cause is None] == [("bus", Severity.WARNING)]
+    assert {one.subject for one in told if one.cause == ("MS201", "bus")} == {"MAC 2", "MAC 5", "MAC 9", "MAC 20"}
+    assert all("one in 50 is usual" in one.seen for one in told)
+
+
+def test_one_station_that_polls_too_often_is_named():
+    nodes = ring()
+    nodes[1] = SimulatedNode(5, TIMING, f510(510), max_master=24, polls_every=4)
+    finding = run(nodes, 15).finding("MS201")
+    assert (finding.subject, finding.severity, finding.cause) == ("MAC 5", Severity.WARNING, None)
 
 
 def test_damaged_frames():

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import pytest
 
 from dissectors.line import MS
 from dissectors.tracker import Verdict
 from tests.dissectors.n2.test_tracker import READ, READ_OTHER, VALUE, Bus
+from tests.faults.buses import n2
+from tests.faults.case import Case
+from tests.faults.judged import run
+from tests.faults.line_faults import paused
 
 ANOTHER = b"A0042920000F1\r"
 
@@ -90,3 +96,12 @@ def test_a_late_answer_does_not_teach_how_soon_another_station_answers() -> None
             bus.say(VALUE, after=30 * MS)
         in_another_turn(bus)
     assert bus.verdicts()[-2:] == [Verdict.LATE, Verdict.OPEN]
+
+
+@pytest.mark.parametrize("pauses", [((10.0, 3.2),), ()])
+def test_one_pause_of_the_whole_bus_makes_no_warning_of_a_slow_station(pauses: tuple[tuple[float, float], ...]) -> None:
+    """In the middle of an exchange: one answer comes after the longest wait of a master."""
+    slow = partial(n2, delays={2: 300 * MS}, pause=20 * MS, timeout=800 * MS)
+    outcome = run(Case("", slow, (), seconds=20, hear=partial(paused, pauses)))
+    assert {one.code for one in outcome.findings} >= {"N2003", *(["N2011"] if pauses else [])}
+    assert not outcome.graves

@@ -86,6 +86,16 @@ def test_a_station_that_holds_the_line_again_and_again_is_named() -> None:
     assert (found.subject, found.severity, found.count) == ("station 3", Severity.WARNING, 10)
 
 
+@pytest.mark.parametrize("burst", [BURST, [b"\0" * 5], [b"\0\x80\0\0\x80\0"]])
+def test_who_speaks_otherwise_behind_one_station_is_not_that_station(burst: list[bytes]) -> None:
+    """The same place behind its frames, but low far too often for a driver that is let go late."""
+    bus = Bus()
+    for turn in range(60):
+        bus.cycle({"station 3": burst} if turn % 6 == 0 else None)
+    (found,) = bus.breaks()
+    assert (found.subject, found.severity, found.count) == ("bus", Severity.WARNING, 10)
+
+
 @pytest.mark.parametrize(
     ("event", "breaks"),
     [
@@ -94,6 +104,9 @@ def test_a_station_that_holds_the_line_again_and_again_is_named() -> None:
         (noise(0, b"\x30\x40\x00\x84"), 0),  # another baud rate
         (noise(0, b"\0", FRAMING), 0),
         (noise(0, b"\0\xaa", reason=Reason.BREAK), 1),
+        (noise(0, b"\x78\x78\x78\0\xf8\0", reason=Reason.BREAK), 0),  # whatever its framer calls it
+        (noise(0, b"\x78\0\0\0\0\x80\0\x78\0\0"), 0),
+        (noise(0, b"\0\0\x80\0\0\xf8"), 4),  # nothing but levels that change once
         (frame(0, LOW, octets=b"\1\0\2"), 0),  # another parity: no break leaves a frame good
         (frame(0, LOW, Damage.SHORT, octets=b"\1\0\2"), 1),
         (Noise(b"\0", 0, 1, Place.AFTER, Reason.BREAK, (Mark(3, LOW),)), 0),

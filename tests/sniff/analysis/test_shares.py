@@ -7,7 +7,7 @@ from functools import partial
 
 import pytest
 
-from dissectors.chances import at_least
+from dissectors.chances import MINUTE, at_least, is_rare
 from dissectors.findings import Finding, Severity
 from dissectors.frame import Place
 from dissectors.simulated_faults import BitFlips, Break, MarkParity, NoiseInGaps
@@ -43,6 +43,22 @@ def test_the_chance_of_so_many() -> None:
     assert at_least(0, 10, 0.5) == 1
     assert at_least(10, 10, 0.5) == pytest.approx(2**-10)
     assert at_least(500, 1000, 0.5) == pytest.approx(0.51, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("count", "of", "span", "rare"),
+    [
+        (1, 1, 0, True),
+        (2, 100, MINUTE, False),  # over 1 in 100
+        (3, 918, 53 * MINUTE // 60, True),  # three in the only minute do not say two a minute
+        (4, 900, MINUTE, True),
+        (5, 900, MINUTE, False),
+        (28, 9000, 10 * MINUTE, True),
+        (29, 9000, 10 * MINUTE, False),
+    ],
+)
+def test_what_is_too_rare_to_say(count: int, of: int, span: int, rare: bool) -> None:
+    assert is_rare(count, of, span) == rare
 
 
 def graves(make: partial, tap: TapModel = EXACT, seconds: float = 30, seed: int = 1) -> set[tuple[str, str]]:  # type: ignore[type-arg]

@@ -1,0 +1,94 @@
+"""Findings about tokens: lost ones, second ones, silences in which none is lost, and stations that the ring lost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from dissectors.bacnet.findings_of_hearing import hasty, unheard_share
+from dissectors.bacnet.limits import MAX_MASTER
+from dissectors.bacnet.lost_tokens import longest_wait
+from dissectors.bacnet.ring import Happened, Ring, RingEventKind
+from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
+from dissectors.findings import Severity, counted, times
+
+STRAYS_SHARE = 0.2
+"""Of a second token is spoken where it shows itself so many times for each frame that the tap did not hear."""
+
+ALONE_POLLS = 2 * MAX_MASTER
+"""A first search for a successor takes at most MAX_MASTER polls."""
+
+
+def tokens(ring: Ring) -> Iterable[Remark]:
+    """Lost tokens and second ones, stations that are gone, and one that is alone."""
+    for (what, mac), happened in ring.happened.items():
+        if what is RingEventKind.LOST_TOKEN and mac is not None:
+            yield of("MS101", mac, _lost(happened, f"MAC {mac} had it"), happened)
+        elif (
+            what is RingEventKind.LEFT
+            and mac is not None
+            and ring.of(RingEventKind.REJOINED, mac).last <= happened.last
+        ):
+            node = ring.nodes.get(mac)
+            gone = node is not None and max(node.last, node.last_token) <= happened.last
+            if gone and not _comes_back(ring, mac, happened.last):
+                seen = "did not use its token, was passed over, and has been silent since"
+                yield of("MS106", mac, seen, happened)
+    strays = [happened for (what, _), happened in ring.happened.items() if what is RingEventKind.TWO_TOKENS]
+    strays += hasty(ring).values()
+    total = sum(happened.count for happened in strays)
+    if total >= 2 and ring.shows_tokens and total > STRAYS_SHARE * unheard_share(ring) * ring.frames:
+        together = strays[0]
+        for happened in strays[1:]:
+            together = together.merge(happened)
+        who = sorted({event.mac for event in together.events if event.mac is not None})
+        seen = f"MAC {listed(who)} sent {times(total)} while another one had the token"
+        yield Remark(who[0] if len(who) == 1 else None, of("MS104", None, seen, together).finding)
+    for mac, node in ring.nodes.items():
+        if node.polls_sent > ALONE_POLLS and not node.tokens_sent and not node.tokens_received:
+            yield plain("MS109", ring, mac, f"{counted(node.polls_sent, 'poll')} for masters and not one token")
+
+
+def silences(ring: Ring) -> Iterable[Remark]:
+    """Silences that lose tokens, and for which no station is named."""
+    lost, all_silent = ring.of(RingEventKind.LOST_TOKEN, None), ring.of(RingEventKind.ALL_SILENT, None)
+    seen = []
+    if lost.count:
+        seen.append(_lost(lost, _unheld(lost, longest_wait(ring.masters))))
+    if all_silent.count:
+        longest = max((event.value or 0 for event in all_silent.events), default=0)
+        seen.append(
+            f"{times(all_silent.count)} nothing was sent for up to {measured(longest)}, and then the ring went on "
+            "where it was, without a search for a successor: all stations were silent together, or only this tap heard "
+            "nothing"
+        )
+    if seen:
+        both = lost.merge(all_silent)
+        yield of("MS101", None, "; ".join(seen), both, Severity.WARNING if both.count > 1 else Severity.NOTE)
+
+
+def _lost(happened: Happened, whose: str) -> str:
+    longest = max((event.value or 0 for event in happened.events), default=0)
+    makers = sorted({event.other for event in happened.events if event.other is not None})
+    return (
+        f"the token was lost {times(happened.count)}; {whose}; silence up to {measured(longest)}; begun anew by MAC "
+        f"{listed(makers)}"
+    )
+
+
+def _unheld(happened: Happened, longest: int) -> str:
+    """Why no station is named for lost tokens; `longest`: that no master that is alive leaves silent, ns."""
+    of_all = sum((event.value or 0) >= longest for event in happened.events)
+    all_silent = (
+        f"all stations were silent together, longer than {measured(longest)}, which no master that is alive leaves: "
+        "their supply, the line or the tap"
+    )
+    disturbed = "who had it is not known, or octets that are no good frame came first"
+    return all_silent if of_all == len(happened.events) else f"{disturbed}; or {all_silent}" if of_all else disturbed
+
+
+def _comes_back(ring: Ring, mac: int, left: int) -> bool:
+    """Whether a station that was away before has not been away clearly longer yet, at the end of what was heard."""
+    leaves = [event.time for event in ring.of(RingEventKind.LEFT, mac).events]
+    returns = [event.time for event in ring.of(RingEventKind.REJOINED, mac).events]
+    away = [back - max(before) for back in returns if (before := [time for time in leaves if time < back])]
+    return bool(away) and (ring.last or left) - left <= 2 * max(away)
