@@ -42,18 +42,18 @@ LINE_RULE_CASES: tuple[Case, ...] = (
     ),
     Case("line, silent for a while", modbus, (("LN304", "bus"),), hear=partial(paused, ((20.0, 12.0),)), seconds=40),
     Case(
-        "line, silent for a while, MS/TP", mstp, (("LN304", "bus"),), hear=partial(paused, ((20.0, 12.0),)), seconds=40
+        "line, silent for a while, MS/TP", mstp, (("LN304", "bus"),), hear=partial(paused, ((3.0, 12.0),)), seconds=20
     ),
     Case(
-        "line, silent for a moment, MS/TP", mstp, (("MS101", "bus"),), hear=partial(paused, ((20.0, 1.2),)), seconds=40
+        "line, silent for a moment, MS/TP", mstp, (("MS101", "bus"),), hear=partial(paused, ((3.0, 1.2),)), seconds=20
     ),
     Case("line, silent for a while, N2", n2, (("LN304", "bus"),), hear=partial(paused, ((20.0, 12.0),)), seconds=40),
     Case(
         "line, silent for a while, PROFIBUS",
         profibus,
         (("LN304", "bus"),),
-        hear=partial(paused, ((5.0, 12.0),)),
-        seconds=20,
+        hear=partial(paused, ((0.6, 12.0),)),
+        seconds=10,
     ),
     Case(
         "line, stations lost at one moment",
