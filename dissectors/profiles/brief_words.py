@@ -12,6 +12,7 @@ from dissectors.profiles.model import EntryRole, Profile
 from dissectors.readings import Reading
 
 Bits = list[tuple[str, EntryRole]]
+Told = list[tuple[Value, str]]
 _TROUBLE = (EntryRole.FAULT, EntryRole.ALARM)
 _MOST_BITS = (2, 1)
 """Bits in words that a status word is left with, one try after the other."""
@@ -20,18 +21,29 @@ _MOST_BITS = (2, 1)
 def say_briefly(profile: Profile | None, readings: Sequence[Reading], room: int) -> str:
     """The same as `say`, with as much left out as `room` characters ask for: all of it fits, or its first number does.
 
-    Bits give way, the last ones of each word: "status running, forward +3; output frequency 45.00 Hz". Where not even
-    the first number has room then, names do, too: "running +4; 45.00 Hz; 6.9 A".
+    Bits give way, the last ones of each word: "status running, forward +3; output frequency 45.00 Hz"; then what says
+    that nothing is wrong, and the names of status words. Where not even the first number has room then, all names do:
+    "running +4; 45.00 Hz; 6.9 A".
     """
     told = list(phrases(profile, readings))
-    ways = [[text for _, text in told]]
-    ways += [[_with_bits(value, text, most) for value, text in told] for most in _MOST_BITS]
-    whole = next((joined(way) for way in ways if len(joined(way)) <= room), None)
-    first = next((place for place, (value, _) in enumerate(told) if _is_number(value)), None)
-    if whole is not None or first is None:
-        return whole or joined(ways[0])
-    partly = next((way for way in ways if len(joined(way[: first + 1])) <= room), None)
-    return joined(partly or [text for text in map(_bare, told) if text])
+    worth = [(value, text) for value, text in told if not _is_well(value)]
+    ways = [told]
+    ways += [[(value, _with_bits(value, text, most)) for value, text in told] for most in _MOST_BITS]
+    ways.append([(value, _with_bits(value, text, 1)) for value, text in worth])
+    ways.append([(value, _nameless(value, text)) for value, text in worth])
+    whole = next((said for said in map(_joined, ways) if len(said) <= room), None)
+    if whole is not None or not any(_is_number(value) for value, _ in told):
+        return whole or _joined(told)
+    partly = (_joined(way) for way in ways if len(_joined(_to_first_number(way))) < room)  # "…" is behind it
+    return next(partly, None) or _joined([(value, _bare(value, text)) for value, text in worth])
+
+
+def _joined(way: Told) -> str:
+    return joined([text for _, text in way])
+
+
+def _to_first_number(way: Told) -> Told:
+    return way[: next(place for place, (value, _) in enumerate(way) if _is_number(value)) + 1]
 
 
 def _with_bits(value: Value, text: str, most: int) -> str:
@@ -45,15 +57,21 @@ def _few(bits: Bits, most: int) -> str:
     return ", ".join(said) + (f" +{len(bits) - len(said)}" if len(said) < len(bits) else "")
 
 
-def _bare(told: tuple[Value, str]) -> str:
-    """A value without its name, where its unit or its bits say enough; empty where it says that nothing is wrong."""
-    value, text = told
+def _nameless(value: Value, text: str) -> str:
+    """A status word by its first bit alone; what is wrong, and anything else, with its name."""
     bits = _bits(value)
-    if bits:
-        return _few(bits, 1)
-    if value.entry is not None and value.words == f"no {value.entry.title}":
-        return ""
-    return number(value.value, value.entry, value.unit) if _is_number(value) else text
+    is_wrong = any(role in _TROUBLE for _, role in bits)
+    return _few(bits, 1) if bits and not is_wrong else _with_bits(value, text, 1)
+
+
+def _bare(value: Value, text: str) -> str:
+    """A value without its name, where its unit or its bits say enough."""
+    return number(value.value, value.entry, value.unit) if _is_number(value) else _nameless(value, text)
+
+
+def _is_well(value: Value) -> bool:
+    """Whether it says that nothing is wrong: "no fault"."""
+    return value.entry is not None and value.words == f"no {value.entry.title}"
 
 
 def _is_number(value: Value) -> bool:

@@ -28,9 +28,8 @@ def describe_briefly(dissector: Dissector, row: Row, meaning: Meaning | None, ro
     """The same where a line has `room` characters: less of what the row means, so that its numbers are seen."""
     text, about = describe(dissector, row, meaning), "" if meaning is None else meaning.about
     before, found, behind = text.partition(about) if about else (text, "", "")
-    if meaning is None or not found or len(before) + len(about) <= room:
-        return text
-    return before + meaning.briefly(room - len(before)) + behind
+    room -= len(before) + bool(behind)  # "…" stands for that
+    return text if meaning is None or not found else before + meaning.briefly(room) + behind
 
 
 def describe_noise(noise: Noise) -> str:
