@@ -24,12 +24,15 @@ def describe(dissector: Dissector, row: Row, meaning: Meaning | None = None) -> 
     return dissector.line(event, row.header, role if role is not Role.UNKNOWN else row.header.role, meaning)
 
 
-def describe_briefly(dissector: Dissector, row: Row, meaning: Meaning | None, room: int) -> str:
-    """The same where a line has `room` characters: less of what the row means, so that its numbers are seen."""
+def describe_briefly(dissector: Dissector, row: Row, meaning: Meaning | None, room: int, *, raw: bool = True) -> str:
+    """The same where a line has `room` characters: less of what the row means, so that its numbers are seen. `raw`:
+    with what stands behind that, else it is left out."""
     text, about = describe(dissector, row, meaning), "" if meaning is None else meaning.about
     before, found, behind = text.partition(about) if about else (text, "", "")
-    room -= len(before) + bool(behind)  # "…" stands for that
-    return text if meaning is None or not found else before + meaning.briefly(room) + behind
+    if meaning is None or not found:
+        return text
+    behind = behind if raw else ""
+    return before + meaning.briefly(room - len(before) - bool(behind)) + behind  # "…" stands for that
 
 
 def describe_noise(noise: Noise) -> str:

@@ -380,6 +380,10 @@ class Store:
         """The same in `room` cells, where leaving out some of what it means makes it fit."""
         return describe_briefly(self.dissector, row, self.meaning(row), room)
 
+    def meant_text(self, row: Row, room: int) -> str:
+        """The same, and nothing but what it means where that is known."""
+        return describe_briefly(self.dissector, row, self.meaning(row), room, raw=False)
+
     def meaning(self, row: Row) -> Meaning | None:
         """What is known of a row besides its octets."""
         return meaning_of(self.dissector, self.devices, row, self._request_of(row))

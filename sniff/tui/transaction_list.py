@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from rich.cells import cell_len
+
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.rows import is_trouble
+from sniff.engine.engine import Row
 from sniff.tui.analyzer import analyzer
-from sniff.tui.columns import Cell, Column
+from sniff.tui.columns import Cell, Column, fit
 from sniff.tui.store_list import StoreList
 from sniff.tui.verdicts import latency_cell, verdict_cell
 
@@ -25,6 +28,7 @@ COLUMNS = (
 
 LINE = 80
 """Cells from which on question and answer may both be read."""
+BESIDE = " · "
 
 
 class TransactionList(StoreList):
@@ -72,15 +76,26 @@ class TransactionList(StoreList):
         response = transaction.response
         if self.width_of("kind") < LINE and response is not None and self.store.told(response):
             rows.reverse()  # values first: both do not fit
-        room = self.width_of("kind")
-        parts = [sanitized(self.brief_text(row, room)) for row in rows if row is not None]
-        parts = parts or [sanitized(transaction.kind)]
+        parts = self._told([row for row in rows if row is not None]) or [sanitized(transaction.kind)]
         error = sanitized(transaction.error or "")
         if error and not any(error in part for part in parts):
             parts.append(error)
         if transaction.of is not None and transaction.verdict in (Verdict.LATE, Verdict.ECHO, Verdict.ANSWERED_TWICE):
             parts.insert(0, f"of tx {transaction.of}")
-        return " · ".join(parts)
+        return BESIDE.join(parts)
+
+    def _told(self, rows: list[Row]) -> list[str]:
+        """What rows say side by side: all of it, or without the raw numbers what has room."""
+        whole, room = [sanitized(self.store.text(row)) for row in rows], self.width_of("kind")
+        if self.shifted or len(BESIDE.join(whole)) <= room:
+            return whole
+        if len(rows) < 2 or room < LINE:
+            return [sanitized(self.brief_text(row, room)) for row in rows]
+        first, second = rows
+        left = room - len(BESIDE)
+        answer = _within(sanitized(self.store.meant_text(second, left // 2)), left // 2)
+        request = sanitized(self.store.meant_text(first, left - len(answer)))
+        return [_within(request, left - len(answer)), answer]
 
     def _time(self, transaction: Transaction, line: int) -> str:
         before = self.store.closed_by_no(self.index[line - 1]) if line else None
@@ -93,3 +108,8 @@ class TransactionList(StoreList):
         if self.viewing.filter:
             return "no transaction passes the filter"
         return "no transaction has closed yet" if analyzer(self).status.live else "no transactions in this file"
+
+
+def _within(text: str, room: int) -> str:
+    """A text in at most so many cells."""
+    return text if cell_len(text) <= room else fit(text, room).rstrip()

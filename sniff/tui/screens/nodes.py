@@ -33,6 +33,8 @@ from sniff.tui.times import interval, latency
 ANSWERS = (Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION)
 FEW, SOME = 3, 8
 """Frame types in the table, and below it."""
+KINDS_ROOM = 72
+"""Cells that those in the table may take, so that the table is no wider than the screen that has them."""
 LEAST_ASKED = 4
 """Lines that what a station is asked for takes at least, where it is that much."""
 
@@ -73,9 +75,11 @@ class Station:
         return 101 if self.health is None else self.health.score
 
 
-def kinds(node: Node, most: int) -> str:
-    """Frame types of the exchanges with a station, the most frequent first."""
+def kinds(node: Node, most: int, room: int | None = None) -> str:
+    """Frame types of the exchanges with a station, the most frequent first, as many as have `room` (cells)."""
     named = [f"{kind} {count}" for kind, count in node.kinds.most_common(most)]
+    while room is not None and len(named) > 1 and len(", ".join(named)) > room:
+        named.pop()
     more = len(node.kinds) - len(named)
     return ", ".join(named) + (f" and {more} more" if more > 0 else "")
 
@@ -96,7 +100,7 @@ COLUMNS: tuple[tuple[str, int, Callable[[Station], str]], ...] = (
     ("sent", 110, lambda one: str(one.node.sent)),
     ("recv", 110, lambda one: str(one.node.received)),
     ("passed", 110, lambda one: str(one.node.passed)),
-    ("frame types", 150, lambda one: kinds(one.node, FEW)),
+    ("frame types", 196, lambda one: kinds(one.node, FEW, KINDS_ROOM)),
 )
 """Title, width of the screen from which it is shown, text."""
 ROOMY = 150
