@@ -33,8 +33,8 @@ from sniff.tui.times import interval, latency
 ANSWERS = (Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION)
 FEW, SOME = 3, 8
 """Frame types in the table, and below it."""
-KINDS_ROOM = 72
-"""Cells that those in the table may take, so that the table is no wider than the screen that has them."""
+BEFORE_KINDS = 128
+"""Cells of all other columns and of " and 9 more": so many less than the screen has are theirs in the table."""
 LEAST_ASKED = 4
 """Lines that what a station is asked for takes at least, where it is that much."""
 
@@ -61,12 +61,14 @@ LABEL, SIDES = 8, 3
 
 @dataclass(frozen=True, slots=True)
 class Station:
-    """What a line shows. `device`: name of its profile; `identity`: the numbers by which it calls itself."""
+    """What a line shows. `device`: name of its profile; `identity`: the numbers by which it calls itself. `room`: cells
+    for its frame types."""
 
     node: Node
     health: Health | None = None
     device: str = ""
     identity: tuple[int, ...] = ()
+    room: int = 0
     findings: tuple[Finding, ...] = field(default=(), compare=False)
 
     @property
@@ -100,7 +102,7 @@ COLUMNS: tuple[tuple[str, int, Callable[[Station], str]], ...] = (
     ("sent", 110, lambda one: str(one.node.sent)),
     ("recv", 110, lambda one: str(one.node.received)),
     ("passed", 110, lambda one: str(one.node.passed)),
-    ("frame types", 196, lambda one: kinds(one.node, FEW, KINDS_ROOM)),
+    ("frame types", 150, lambda one: kinds(one.node, FEW, one.room)),
 )
 """Title, width of the screen from which it is shown, text."""
 ROOMY = 150
@@ -201,11 +203,12 @@ class NodesScreen(SearchScreen):
         about: dict[int | None, list[Finding]] = {}
         for finding in self.viewing.findings():
             about.setdefault(station_of(finding), []).append(finding)
+        room = self.app.size.width - BEFORE_KINDS
         for node in self.store.nodes.present():
             at = node.address
             profile = devices.at(at)
             name = "" if profile is None or not node.asked else profile.name
-            yield Station(node, scores.get(at), name, identities.get(at, ()), tuple(about.get(at, ())))
+            yield Station(node, scores.get(at), name, identities.get(at, ()), room, tuple(about.get(at, ())))
 
     def _lay_out(self, table: StationTable, stations: list[Station]) -> None:
         width = self.app.size.width
