@@ -118,7 +118,8 @@ def test_every_pending_case_exists_and_names_are_told_apart() -> None:
 
 
 def test_the_table_adds_up(capsys: pytest.CaptureFixture[str]) -> None:
-    assert matrix.main(["RTU station absent", "N2 clean, exact", "--jobs=1", "--seeds=1", "--clean-minutes=0.1"]) == 0
+    words = ("RTU station absent, master by the clock", "N2 clean, exact")
+    assert matrix.main([*words, "--jobs=1", "--seeds=1", "--clean-minutes=0.1"]) == 0
     told = capsys.readouterr().out
     assert "1 cases with a fault, 1 runs, recall 100.0%" in told
     assert "0 accusations" in told
