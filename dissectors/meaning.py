@@ -95,7 +95,8 @@ class Meaning:
         if len(said) <= room or self.profile is None or self.refused or not self.readings:
             return said
         device = f"{self.who}: " if self.station is None else ""
-        return device + (say_briefly(self.profile, self.readings, room - len(device)) or self._question())
+        brief = say_briefly(self.profile, self.readings, room - len(device))
+        return device + brief if brief else said
 
     def _question(self) -> str:
         """ "read status, fault, output frequency"; what the profile does not know is left out."""

@@ -45,6 +45,6 @@ class LongSilences:
             self._before.append(no)
         return not is_timeout
 
-    def hide_answer_to(self, no: int) -> bool:
+    def may_have_been_answered(self, no: int) -> bool:
         """Whether the request of that row stands before one that proves nothing."""
         return no in self._before

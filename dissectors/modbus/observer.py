@@ -210,7 +210,7 @@ class ModbusFindings(RowObserver):
             return
         if verdict is Verdict.NO_RESPONSE:
             may_be_answer = asked.is_behind_silence and asked.header.role is not Role.REQUEST
-            if may_be_answer or self.silences.hide_answer_to(asked.no):
+            if may_be_answer or self.silences.may_have_been_answered(asked.no):
                 return
         if asked.fault is not None:
             self.seen.malformed.add(transaction.start, transaction.request, transaction.response)

@@ -57,7 +57,8 @@ def meant(frame: Frame, header: Header, role: Role, meaning: Meaning) -> str:
         return f"{station} → {plain} ({_what(asked)}){_damage(frame)}"
     raw = told.raw if len(told.raw) <= MOST_RAW else f"{told.raw[:MOST_RAW]} … +{len(told.raw) - MOST_RAW}"
     raw = f"A {raw}" if raw else "A"
-    plain = _answer(told, asked, _is_ignored(asked, meaning))
+    is_ignored = _is_ignored(asked, meaning)
+    said, plain = "" if is_ignored else said, _answer(told, asked, is_ignored)
     words = [said, raw] if said and told.value is None else [said, plain, raw] if said else [plain, raw]
     return f"{station} → {' — '.join(word for word in words if word)}{_damage(frame)}"
 

@@ -26,12 +26,12 @@ def describe(dissector: Dissector, row: Row, meaning: Meaning | None = None) -> 
 
 def describe_briefly(dissector: Dissector, row: Row, meaning: Meaning | None, room: int, *, raw: bool = True) -> str:
     """The same where a line has `room` characters: less of what the row means, so that its numbers are seen. `raw`:
-    with what stands behind that, else it is left out."""
+    with what stands behind that; else the raw numbers of values and questions are left out."""
     text, about = describe(dissector, row, meaning), "" if meaning is None else meaning.about
     before, found, behind = text.partition(about) if about else (text, "", "")
     if meaning is None or not found:
         return text
-    behind = behind if raw else ""
+    behind = behind if raw or not (meaning.readings or meaning.asked) else ""
     return before + meaning.briefly(room - len(before) - bool(behind)) + behind  # "…" stands for that
 
 

@@ -87,15 +87,15 @@ class TransactionList(StoreList):
     def _told(self, rows: list[Row]) -> list[str]:
         """What rows say side by side: all of it, or without the raw numbers what has room."""
         whole, room = [sanitized(self.store.text(row)) for row in rows], self.width_of("kind")
-        if self.shifted or len(BESIDE.join(whole)) <= room:
+        if self.shifted or cell_len(BESIDE.join(whole)) <= room:
             return whole
         if len(rows) < 2 or room < LINE:
             return [sanitized(self.brief_text(row, room)) for row in rows]
         first, second = rows
         left = room - len(BESIDE)
         answer = _within(sanitized(self.store.meant_text(second, left // 2)), left // 2)
-        request = sanitized(self.store.meant_text(first, left - len(answer)))
-        return [_within(request, left - len(answer)), answer]
+        left -= cell_len(answer)
+        return [_within(sanitized(self.store.meant_text(first, left)), left), answer]
 
     def _time(self, transaction: Transaction, line: int) -> str:
         before = self.store.closed_by_no(self.index[line - 1]) if line else None
