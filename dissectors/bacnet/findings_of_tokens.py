@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from dissectors.bacnet.findings_of_hearing import hasty, unheard_share
-from dissectors.bacnet.limits import MAX_MASTER
-from dissectors.bacnet.lost_tokens import longest_wait
+from dissectors.bacnet.limits import MAX_MASTER, T_ALL_SILENT
 from dissectors.bacnet.ring import Happened, Ring, RingEventKind
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.findings import Severity, counted, times
@@ -53,7 +52,7 @@ def silences(ring: Ring) -> Iterable[Remark]:
     lost, all_silent = ring.of(RingEventKind.LOST_TOKEN, None), ring.of(RingEventKind.ALL_SILENT, None)
     seen = []
     if lost.count:
-        seen.append(_lost(lost, _unheld(lost, longest_wait(ring.masters))))
+        seen.append(_lost(lost, _unheld(lost)))
     if all_silent.count:
         longest = max((event.value or 0 for event in all_silent.events), default=0)
         seen.append(
@@ -75,14 +74,14 @@ def _lost(happened: Happened, whose: str) -> str:
     )
 
 
-def _unheld(happened: Happened, longest: int) -> str:
-    """Why no station is named for lost tokens; `longest`: that no master that is alive leaves silent, ns."""
-    of_all = sum((event.value or 0) >= longest for event in happened.events)
+def _unheld(happened: Happened) -> str:
+    """Why no station is named for lost tokens."""
+    of_all = sum((event.value or 0) >= T_ALL_SILENT for event in happened.events)
     all_silent = (
-        f"all stations were silent together, longer than {measured(longest)}, which no master that is alive leaves: "
-        "their supply, the line or the tap"
+        f"all stations were silent together, longer than {measured(T_ALL_SILENT)}, which no master that is alive "
+        "leaves: their supply, the line or the tap"
     )
-    disturbed = "who had it is not known, or octets that are no good frame came first"
+    disturbed = "who had it is not known, octets that are no good frame came first, or no other master began in time"
     return all_silent if of_all == len(happened.events) else f"{disturbed}; or {all_silent}" if of_all else disturbed
 
 
