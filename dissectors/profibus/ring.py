@@ -87,7 +87,7 @@ class Ring:
 
 @dataclass(frozen=True, slots=True)
 class RingWindow:
-    """`bus`: of the whole ring. `nodes`: of each master. Names say the unit."""
+    """`bus`: of the whole ring. `nodes`: of each master. Named as every ring's are; names say the unit."""
 
     bus: Numbers
     nodes: Mapping[int, Numbers]
@@ -104,7 +104,7 @@ def ring_window(before: Ring, now: Ring) -> RingWindow:
         if view.tokens > earlier.tokens or view.polls > earlier.polls:
             nodes[address] = {
                 "tokens": view.tokens - earlier.tokens,
-                "token_repeats": view.repeats - earlier.repeats,
+                "token_retries": view.repeats - earlier.repeats,
                 "polls_unanswered": (view.polls - view.answered) - (earlier.polls - earlier.answered),
                 **_times(rotation),
             }
@@ -121,5 +121,5 @@ def ring_window(before: Ring, now: Ring) -> RingWindow:
 
 
 def _times(rotation: Histogram) -> dict[str, int | float]:
-    named = (("rotation_p50_ms", rotation.quantile(0.5)), ("rotation_max_ms", rotation.quantile(1)))
+    named = (("loop_p50_ms", rotation.quantile(0.5)), ("loop_max_ms", rotation.quantile(1)))
     return {key: value / MS for key, value in named if value is not None}

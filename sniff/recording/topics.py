@@ -124,6 +124,7 @@ BUS_SCHEMA = _flat(
         "token_retries": ("integer", "token passing: tokens sent again because nobody used them"),
         "tokens_lost": ("integer", "token passing: silences after which somebody made a new token"),
         "poll_waste": ("number", "token passing: share of the time that unanswered polls for masters took, 0 ... 1"),
+        "slaves_in_exchange": ("integer", "token passing: stations without a token that exchange data in cycles"),
         "loop_p50_ms": ("number", "token passing: median time from token to token of a station, ms"),
         "loop_max_ms": ("number", "token passing: longest time from token to token of a station, ms"),
     },

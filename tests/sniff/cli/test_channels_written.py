@@ -27,7 +27,7 @@ COMMANDS = (
 
 
 @pytest.mark.parametrize("words", COMMANDS)
-@pytest.mark.parametrize("name", ["rtu-usual-faults", "ascii-clean", "n2-clean", "mstp-clean"])
+@pytest.mark.parametrize("name", ["rtu-usual-faults", "ascii-clean", "n2-clean", "mstp-clean", "profibus-clean"])
 def test_every_command_writes_what_can_be_plotted(
     words: str, name: str, tmp_path: Path, sniff485: Callable[..., Any]
 ) -> None:
