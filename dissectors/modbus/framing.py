@@ -28,10 +28,13 @@ from dissectors.framer import Framer, OctetWindow
 from dissectors.line import Timing
 from dissectors.modbus.best_split import ADJACENT, HEARD, PROVED, SILENCE_INSIDE, Paths, worth
 from dissectors.modbus.candidates import (
+    ANY_END,
     CRC_BITS,
     Candidate,
     CandidateFinder,
     LengthGuess,
+    exception_bits,
+    is_text,
     lacks_zeros,
     octet_bits,
     octet_hope,
@@ -41,8 +44,8 @@ from dissectors.modbus.candidates import (
 from dissectors.modbus.damaged import Side
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, MAX_UNIT, is_open_length
 from dissectors.modbus.lengths import MAX_FRAME, MORE
-from dissectors.modbus.open_length import OpenLengthFinder
-from dissectors.modbus.open_request import EXACT
+from dissectors.modbus.open_length import OpenLengthFinder, settled_end
+from dissectors.modbus.open_request import EXACT, expectation
 from dissectors.modbus.past import KNOWN_LENGTH
 from dissectors.modbus.rtu_window import RtuWindow
 
@@ -173,9 +176,13 @@ class RtuFramer:
         if found and self._take_head(found, count, True):
             self._next = max(_FIRST, count - window.base + base)
             return
-        if not found and count < _FIRST_OPEN and window.in_step() and is_open_length(window.octets):
-            self._next = _FIRST_OPEN
-            return
+        if not found and window.in_step() and is_open_length(window.octets):
+            if self._take_open_heads(count):
+                self._next = max(_FIRST, count - window.base + base)
+                return
+            if count < _FIRST_OPEN:
+                self._next = _FIRST_OPEN
+                return
         wait = WINDOW + 1  # until the shortest reading of the head that is still open is complete
         for length, _, _ in found:
             if length >= count or length == MORE:
@@ -262,6 +269,36 @@ class RtuFramer:
             return False
         window.take_frame(best.length, best.request, best.response)
         return True
+
+    def _take_open_heads(self, count: int) -> bool:
+        """Take the frames of unpredicted length that the window begins with, as long as nothing to come changes them.
+
+        One that is weak on its own is taken with its answer. The general way would find the same, more slowly.
+        """
+        window = self._window
+        known, begin, at = bytes(window.octets[:count]), window.base, 0
+        weak, lacking, expected = 0, 0, window.expected  # length and worth of a request that waits for its answer
+        while not window.cuts and (end := settled_end(known, at)):
+            stretch = known[at:end]
+            fit = expected.fit(stretch, True) if expected is not None else 0
+            if not fit and (weak or (stretch[0] not in window.units and is_text(stretch))):
+                break
+            asks = not stretch[1] & EXCEPTION_BIT
+            bits = ANY_END if asks else CRC_BITS + exception_bits(stretch[2])
+            bits += max(fit, window.past.bits(stretch, asks, True)) + window.edge(begin + end)
+            bits += ADJACENT if weak or window.good_before else window.start_bits()
+            own = worth(bits + HEARD if stretch[0] in window.units else bits, len(stretch))
+            if own + lacking < 0:
+                if weak or not asks:
+                    break
+                weak, lacking, expected = len(stretch), own, expectation(expected, stretch, True, True)
+            else:
+                if weak:
+                    window.take_frame(weak, True, True)
+                window.take_frame(len(stretch), asks, True)
+                weak, lacking, expected = 0, 0, window.expected
+            at = end
+        return window.base > begin
 
     def _hope(self, reading: LengthGuess, count: int) -> int:
         """What the head may be worth once it is complete."""

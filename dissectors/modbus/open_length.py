@@ -3,13 +3,14 @@
 Between two silences a good CRC over all of the octets is enough (candidates.whole_stretch). In a run of several frames
 any stretch from a place where a frame may begin could be one, and one of 260 such places in random octets has a good
 CRC somewhere behind it. So the end of such a frame counts only where something agrees: silence; a good frame of a known
-function that begins there; or a frame of the same station and function (a request and its answer, or its exception).
-The answer itself, behind its request, ends at the first place where its CRC is good.
+function that begins there; a frame of the same station and function (a request and its answer, or its exception); or
+two such frames of another station. The answer itself, behind its request, ends at the first place where its CRC is
+good.
 """
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Iterator
 from typing import Final
 
 from dissectors.checksums import crc16_modbus
@@ -48,8 +49,8 @@ _TABLE: Final = tuple(_step(value) for value in range(256))
 class _Begin:
     """A place where such a frame may begin, and how far its CRC was followed.
 
-    Behind a good CRC and the same station and function again, nothing longer that begins here is a frame: both would
-    have to be chance.
+    Behind a good CRC where an exchange goes on or begins, nothing longer that begins here is a frame: both would have
+    to be chance.
     """
 
     __slots__ = ("begin", "crc", "ends", "is_over", "to")
@@ -71,7 +72,7 @@ class _Begin:
             at += 1
             if not crc and at >= least:
                 self.ends.append(at)
-                self.is_over = _same(known, self.begin - base, at - base)
+                self.is_over = _is_agreed(known, self.begin - base, at - base)
                 if self.is_over:
                     break
         self.crc, self.to = crc, at
@@ -114,8 +115,8 @@ class OpenLengthFinder:
         starts = {candidate.start for candidate in good}
         last = base + len(known) - MIN_FRAME
         ends = {candidate.start + candidate.length for candidate in good}
-        ahead = {p for p in ends if p <= last and known[p - base + 1] in _UNPREDICTED and self._opens(known, p - base)}
-        ahead.update(p for p in begins if self._opens(known, p - base))
+        ahead = {p for p in ends if p <= last and known[p - base + 1] in _UNPREDICTED and _opens(known, p - base)}
+        ahead.update(p for p in begins if _opens(known, p - base))
         self.unfinished = []
         if not ahead:
             return []
@@ -136,18 +137,12 @@ class OpenLengthFinder:
                 found[position, candidate.length] = candidate
                 end = candidate.end
                 answers = _same(known, position - base, end - base)
-                if end not in partner and self._opens(known, end - base):
+                if end not in partner and _opens(known, end - base):
                     ahead.add(end)
                 elif answers and not silent and end - base > len(known) - MIN_FRAME:
                     self.unfinished.append(end)  # no more than its head is there
                 partner[end] = partner.get(end, False) or answers
         return list(found.values())
-
-    def _opens(self, known: bytes, at: int) -> bool:
-        """Whether the head of such a frame, or of an exception to one, stands there."""
-        if not 0 <= at <= len(known) - MIN_FRAME or known[at] == BROADCAST:
-            return False
-        return is_open_length(known, at) or _is_exception(known, at)
 
     def _frames(
         self,
@@ -179,7 +174,7 @@ class OpenLengthFinder:
         for position_after in begin.follow(known, base, position + MIN_FRAME, most):
             after = position_after - base
             last = silent and after == end
-            agreed = last or position_after in starts or _same(known, at, after)
+            agreed = last or position_after in starts or _is_agreed(known, at, after)
             if not agreed and not (partner and after + 2 <= end and known[after]):
                 continue
             unsure = not agreed
@@ -191,6 +186,53 @@ class OpenLengthFinder:
         if unsure and not silent and len(frames) == 1 and end - at < MAX_FRAME:
             self.unfinished.append(position)  # of a longer one, at whose end something agrees, the rest may come yet
         return frames
+
+
+def settled_end(known: bytes, at: int) -> int:
+    """Index behind the frame that begins at `at`, if it is one that nothing to come can change, else 0."""
+    if not _opens(known, at):
+        return 0
+    if _is_exception(known, at):
+        end = at + EXCEPTION_LENGTH
+        return end if end < len(known) and not crc16_modbus(known[at:end]) else 0
+    end = _goes_on(known, at)
+    if end:
+        return end
+    for end in _good_ends(known, at):
+        if _begins_exchange(known, end):
+            return end
+    return 0
+
+
+def _is_agreed(known: bytes, at: int, after: int) -> bool:
+    """Whether what stands at `after` says that the frame which begins at `at` ends there."""
+    return _same(known, at, after) or _begins_exchange(known, after)
+
+
+def _begins_exchange(known: bytes, at: int) -> bool:
+    """Whether a frame with a good CRC begins there, and another of its station and function behind it."""
+    return _opens(known, at) and not known[at + 1] & EXCEPTION_BIT and bool(_goes_on(known, at))
+
+
+def _goes_on(known: bytes, at: int) -> int:
+    """The first index with a good CRC behind which the station and the function of `at` are named again, else 0."""
+    return next((end for end in _good_ends(known, at) if _same(known, at, end)), 0)
+
+
+def _good_ends(known: bytes, at: int) -> Iterator[int]:
+    """Every index at which the CRC of what begins at `at` is good."""
+    crc, table, least = _INITIAL, _TABLE, at + MIN_FRAME
+    for end, octet in enumerate(known[at : at + MAX_FRAME], at + 1):
+        crc = crc >> 8 ^ table[(crc ^ octet) & 0xFF]
+        if not crc and end >= least:
+            yield end
+
+
+def _opens(known: bytes, at: int) -> bool:
+    """Whether the head of such a frame, or of an exception to one, stands there."""
+    if not 0 <= at <= len(known) - MIN_FRAME or known[at] == BROADCAST:
+        return False
+    return is_open_length(known, at) or _is_exception(known, at)
 
 
 def _is_exception(known: bytes, at: int) -> bool:

@@ -13,7 +13,7 @@ import gc
 import random
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 from dissectors import registry
 from dissectors.checksums import crc16_modbus
@@ -69,6 +69,16 @@ PATTERNS: dict[str, bytes] = {
 _FRAMERS = ("modbus-rtu", "modbus-ascii", "n2", "mstp")
 
 
+def _glued(dice: random.Random, count: int, codes: Sequence[int], least: int, most: int, times: int) -> bytes:
+    """Good frames of nine stations, `times` of them one after the other of the same station and function."""
+    octets = bytearray()
+    while len(octets) < count:
+        head = bytes((dice.randint(1, 9), dice.choice(codes)))
+        for _ in range(times):
+            octets += _sealed((head + dice.randbytes(dice.randint(least, most))).hex())
+    return bytes(octets[:count])
+
+
 def inputs(count: int) -> Iterator[tuple[str, bytes]]:
     """Every input, `count` octets of each."""
     for name, pattern in PATTERNS.items():
@@ -78,6 +88,8 @@ def inputs(count: int) -> Iterator[tuple[str, bytes]]:
     yield "random 0 … 3", bytes(dice.choices((0, 1, 2, 3), k=count))
     codes = (1, 2, 3, 4, 7, 8, 0x0C, 0x0F, 0x10, 0x11, 0x14, 0x15, 0x16, 0x17, 0x18, 0x2B, 0x83)
     yield "random function codes", bytes(dice.choices(codes, k=count))
+    yield "RTU exchanges of vendor functions, glued", _glued(dice, count, (65, 66, 72, 100, 110), 0, 4, 2)
+    yield "RTU of four octets, any station, glued", _glued(dice, count, (7, 11, 12, 17), 0, 0, 1)
     yield "random hex digits", bytes(dice.choices(b"0123456789ABCDEF", k=count))
     yield "random ':' hex CR LF", bytes(dice.choices(b"0123456789ABCDEF::::\r\n", k=count))
 
@@ -105,10 +117,10 @@ def main(counts: list[int]) -> None:
         rate(registry.get(name).framer, bytes(READ))  # what is loaded at first use
     for count in counts:
         print(f"\n{count} octets; kB/s")
-        print(f"{'':34}" + "".join(f"{name:>14}" for name in names))
+        print(f"{'':42}" + "".join(f"{name:>14}" for name in names))
         for label, octets in inputs(count):
             rates = [rate(registry.get(name).framer, octets) for name in names]
-            print(f"{label:34}" + "".join(f"{each:14.0f}" for each in rates), flush=True)
+            print(f"{label:42}" + "".join(f"{each:14.0f}" for each in rates), flush=True)
 
 
 if __name__ == "__main__":
