@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum, Flag, auto
 
+from dissectors.quick_values import quickly_made
+
 
 class LineError(Flag):
     """What a UART reported about one octet.
@@ -30,6 +32,7 @@ class Mark:
     error: LineError
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Chunk:
     """What one read returned: the only evidence; everything else is computed from it.
@@ -120,6 +123,7 @@ class Assembly:
         return not self.missing
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Frame:
     """One frame as it was on the wire, good or damaged; `octets` include delimiters and check.
@@ -174,6 +178,7 @@ class Reason(Enum):
     BREAK = "break"
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Noise:
     """Octets that are no frame; every octet of a capture is in exactly one Frame or Noise."""
@@ -203,6 +208,7 @@ class Role(Enum):
     UNKNOWN = "unknown"
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Header:
     """What one quick look (`peek`) finds in a frame. None where the frame has no such thing or ended before it.

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from dissectors.quick_values import quickly_made
+
 NS_PER_S = 1_000_000_000
 MS = 1_000_000
 """ns in a millisecond."""
@@ -60,6 +62,7 @@ class LineSettings:
         return int(count * NS_PER_S // self.baud)
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Timing:
     """A line and how far its times can be trusted.

@@ -13,6 +13,7 @@ from typing import Protocol
 
 from dissectors.frame import Assembly, Event, Header, Role
 from dissectors.line import Timing
+from dissectors.quick_values import quickly_made
 
 
 class Verdict(Enum):
@@ -56,6 +57,7 @@ class Passing(StrEnum):
 PASSING = frozenset(kind.value for kind in Passing)
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Interval:
     """A duration that the adapter allows to be known only within bounds: low ≤ truth ≤ high, ns."""
@@ -65,6 +67,7 @@ class Interval:
     high: int
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Placement:
     """Where a frame belongs: `no` is the caller's number of it, `tx` the transaction's."""
@@ -76,6 +79,7 @@ class Placement:
     destination: int | None = None
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Transaction:
     """One exchange, closed: it does not change any more.
@@ -105,6 +109,7 @@ class Transaction:
         return self.kind in PASSING
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Tracked:
     """What one event did: its own placement (None for noise), and the transactions that it closed, in order.

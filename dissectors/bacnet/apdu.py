@@ -14,6 +14,7 @@ from enum import IntEnum
 
 from dissectors.bacnet import names
 from dissectors.bacnet.services import service_name
+from dissectors.quick_values import quickly_made
 
 
 class PduType(IntEnum):
@@ -48,6 +49,7 @@ SEGMENTED, MORE_FOLLOWS, SEGMENTED_ACCEPTED = 8, 4, 2
 NEGATIVE_ACK, SERVER = 2, 1
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Apdu:
     """An APDU header. None where the PDU type has no such field or the octets end before it.

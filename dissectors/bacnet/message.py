@@ -11,8 +11,10 @@ from dissectors.bacnet.apdu import Apdu
 from dissectors.bacnet.frame_types import CARRIES_NPDU, HEADER, data_length, is_encoded
 from dissectors.bacnet.npdu import Npdu
 from dissectors.frame import Assembly, Check, Damage, Frame
+from dissectors.quick_values import quickly_made
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Message:
     """What a frame says. `data`: the octets it carries, decoded where the type is encoded; b"" when none.

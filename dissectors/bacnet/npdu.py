@@ -11,6 +11,8 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
+from dissectors.quick_values import quickly_made
+
 VERSION = 1
 NETWORK_MESSAGE = 0x80
 HAS_DESTINATION = 0x20
@@ -54,6 +56,7 @@ REJECTIONS: dict[int, str] = {
 }
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Npdu:
     """A network header. `dnet`, `dadr`, `snet`, `sadr`, `hops`, `message`, `vendor` are None where absent.

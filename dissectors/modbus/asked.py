@@ -10,6 +10,7 @@ from dissectors.modbus.envelope import ASCII_NAME
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, ITEMS_ASKED, answer_length
 from dissectors.modbus.notation import CHECK, HEAD
 from dissectors.modbus.station_record import Key
+from dissectors.quick_values import quickly_made
 
 LONGEST_READ = 11
 """Octets: no RTU request that reads is longer, and what is stuck to it by noise."""
@@ -17,6 +18,7 @@ LONGEST_READ = 11
 _USUAL_ANSWER = 8  # octets of an answer of unknown length, RTU
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class AskedRequest:
     """The request of an open transaction."""

@@ -7,12 +7,14 @@ from dataclasses import dataclass, field
 from dissectors.frame import Frame, Header, Role
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS
 from dissectors.modbus.learned_timing import READ, WRITE
+from dissectors.quick_values import quickly_made
 from dissectors.tracker import Interval, Transaction, Verdict
 
 _OWN_PACE = 0x100
 """Added to a function code: a function that nobody knows takes a time of its own."""
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Seen:
     """One frame as the tracker sees it: its number, its header, its unit and PDU octets."""

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from statistics import median
 
+from dissectors.quick_values import quickly_made
 from dissectors.tracker import Interval
 
 ANSWERS_KEPT = 96
@@ -29,6 +30,7 @@ _FIRST_KEPT = 8  # response times, of which the median is taken
 _FEW_VALUES = 3  # different answers of a group, up to which it says something that the two groups have none in common
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class AnsweredRequest:
     """One answer: its row, how long it took, its octets."""

@@ -35,6 +35,7 @@ from dissectors.n2.envelope import (
     repaired_command,
 )
 from dissectors.n2.forms import fits, may_answer
+from dissectors.quick_values import quickly_made
 
 STRAY: Final = 3
 """Most octets of junk directly before an answer, as of a driver that is switched on too late."""
@@ -80,6 +81,7 @@ def good_whole(octets: bytes, before: Before, *, waits: bool, proved: bool) -> C
     return check if damage is None and (check is Check.GOOD or proved) else None
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class N2Stretch:
     """Octets and what is known about them.

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from dissectors.checksums import sum8
 from dissectors.profibus.control import Control
+from dissectors.quick_values import quickly_made
 
 SD1, SD2, SD3, SD4, SC, ED = 0x10, 0x68, 0xA2, 0xDC, 0xE5, 0x16
 BROADCAST = 127
@@ -24,6 +25,7 @@ _EXTENSION = 0x80
 _SEGMENT = 0x40
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Telegram:
     """One telegram. `start`: its start delimiter. None where it has no such thing, or ended before it.

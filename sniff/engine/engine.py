@@ -11,10 +11,12 @@ from dataclasses import dataclass, field, replace
 from dissectors.frame import Chunk, Event, Frame, Header
 from dissectors.line import LineSettings, Timing
 from dissectors.manifest import Dissector
+from dissectors.quick_values import quickly_made
 from dissectors.tracker import Placement, Tracker, Transaction, Unpaired
 from sniff.engine.late_reads import LateReads
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Row:
     """One event of the bus with what is known of it at once.
@@ -31,6 +33,7 @@ class Row:
     searched: LineSettings | None = None
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Output:
     """What one step of the engine gave: new rows, then the transactions that closed.
