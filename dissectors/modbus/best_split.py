@@ -66,11 +66,14 @@ class Surroundings(Protocol):
     """The window, and what stands round a position of it (positions count from the first octet ever fed).
 
     `base`: position of the window's first octet. `expected`: the open request before it. `good_before`: a good frame
-    ends directly before it. `past`: what was said before.
+    ends directly before it. `past`: what was said before. `units`: stations that good frames named. `cuts`: positions
+    of proved silences.
     """
 
     octets: bytearray
     base: int
+    cuts: list[int]
+    units: set[int]
     expected: Expected | None
     good_before: bool
     past: Past
@@ -81,10 +84,6 @@ class Surroundings(Protocol):
 
     def inside(self, start: int, end: int) -> int:
         """Number of proved silences strictly between."""
-        ...
-
-    def heard(self, unit: int) -> bool:
-        """Whether good frames named this station."""
         ...
 
 
@@ -137,7 +136,8 @@ class Paths:
         self._steps = [root]
         self._touching: dict[int, tuple[_Step, ...]] = {window.base: (root,)}  # by the position that they end at
         self._awaiting: dict[int, tuple[list[int], list[_Step]]] = {}  # as the first two, by request left open
-        self._remember_awaiting(window.base, root)
+        if root.expected is not None:
+            self._remember_awaiting(window.base, root, root.expected)
 
     def extend(self, candidates: Iterable[Candidate]) -> bool:
         """Add candidates; False, and nothing done, when one ends before what was added earlier."""
@@ -190,7 +190,7 @@ class Paths:
         at = start - window.base
         unit, code = window.octets[at], window.octets[at + 1]
         return (
-            window.heard(unit)
+            unit in window.units
             or code in _WELL_TOLD
             or start in self._touching
             or unit << 8 | code & ~EXCEPTION_BIT in self._awaiting
@@ -207,39 +207,49 @@ class Paths:
         return any(each.worth > near and id(each) not in path for each in self._steps)
 
     def _add(self, candidate: Candidate) -> None:
-        window, start, end = self._window, candidate.start, candidate.end
-        octets = candidate.octets
+        start, length, bits, unit, request, response, octets, zeros = candidate
         if start < self.base:
             return
-        bits = candidate.bits + window.edge(end) + _standing(window, candidate.unit, start, end)
-        known = window.past.bits(octets, candidate.request, candidate.response)
-        edge = window.edge(start)
-        either = candidate.request and candidate.response
+        window, end = self._window, start + length
+        bits += window.edge(end) + _standing(window, unit, start, end)
+        known = window.past.bits(octets, request, response)
+        edge = -1  # evidence that a frame begins at `start`, once it is asked for
+        either = request and response
         chosen: dict[bool, tuple[int, _Step]] = {}  # one that may be both is tried as request and as answer
-        for step in self._options(start, candidate.unit, octets[1]):
-            asked = step.expected is not None and step.expected.is_for(octets, 0)
-            fit = step.expected.fit(octets, candidate.response) if asked and step.expected is not None else 0
-            if candidate.request and octets == step.asked:
-                fit = max(fit, REPEATED)
-            own = bits + max(fit, known) + (ADJACENT if step.end == start else edge)
-            if candidate.zeros:
-                own += zero_bits(window, candidate, step.expected, fit)
-            reached = step.worth + worth(own, candidate.length)
+        for step in self._options(start, unit, octets[1]):
+            expected = step.expected
+            fit, asked = known, False
+            if expected is not None and expected.is_for(octets, 0):
+                fit, asked = expected.fit(octets, response), True
+            if request and fit < REPEATED and octets == step.asked:
+                fit = REPEATED
+            own = bits + (fit if fit > known else known)
+            if step.end == start:
+                own += ADJACENT
+            else:
+                if edge < 0:
+                    edge = window.edge(start)
+                own += edge
+            if zeros:
+                own += zero_bits(window, candidate, expected, fit)
+            reached = step.worth + worth(own, length)
             answers = either and asked
             if answers not in chosen or reached > chosen[answers][0]:
                 chosen[answers] = reached, step
         for total, before in chosen.values():
-            after = expectation(before.expected, octets, candidate.request, candidate.response)
+            after = expectation(before.expected, octets, request, response)
             step = _Step(total, candidate, before, end, after, before.asked if after is None else octets)
             self._ends.append(end)
             self._best.append(step if total > self._best[-1].worth else self._best[-1])
             self._touching[end] = (*self._touching.get(end, ()), step)
             self._steps.append(step)
-            self._remember_awaiting(end, step)
+            if after is not None:
+                self._remember_awaiting(end, step, after)
 
     def _options(self, start: int, unit: int, code: int) -> Sequence[_Step]:
         """Paths that a frame may follow; the best of them is among these."""
-        best = self._best[bisect_right(self._ends, start) - 1]
+        ends = self._ends
+        best = self._best[-1 if ends[-1] <= start else bisect_right(ends, start) - 1]
         options = self._touching.get(start, ())
         if best not in options:
             options = (*options, best)
@@ -276,7 +286,7 @@ class Paths:
         edge = window.edge(start)
         most, best = -1, self._best[0]
         for step in self._options(start, unit, code):
-            bits = ANY_END + (ADJACENT if step.end == start else edge) + (HEARD if window.heard(unit) else 0)
+            bits = ANY_END + (ADJACENT if step.end == start else edge) + (HEARD if unit in window.units else 0)
             if step.expected is not None and step.expected.is_for(octets, at):
                 bits += SAME_UNKNOWN
             total = step.worth + worth(bits, MIN_FRAME)
@@ -284,10 +294,7 @@ class Paths:
                 most, best = total, step
         return most, best
 
-    def _remember_awaiting(self, end: int, step: _Step) -> None:
-        expected = step.expected
-        if expected is None:
-            return
+    def _remember_awaiting(self, end: int, step: _Step, expected: Expected) -> None:
         ends, best = self._awaiting.setdefault(expected.unit << 8 | expected.function, ([], []))
         ends.append(end)
         best.append(step if not best or step.worth > best[-1].worth else best[-1])
@@ -295,9 +302,8 @@ class Paths:
 
 def _standing(window: Surroundings, unit: int, start: int, end: int) -> int:
     """Bits for a known station, less those for silences inside."""
-    bits = HEARD if window.heard(unit) else 0
-    silences = window.inside(start, end)
-    return bits + SILENCE_INSIDE * silences if silences else bits
+    bits = HEARD if unit in window.units else 0
+    return bits + SILENCE_INSIDE * window.inside(start, end) if window.cuts else bits
 
 
 def _by_end(candidate: Candidate) -> tuple[int, int]:

@@ -22,7 +22,8 @@ from dissectors.modbus.functions import (
     VENDOR_EXCEPTIONS,
     is_open_length,
 )
-from dissectors.modbus.lengths import MAX_FRAME, MIN_FRAME, MORE, Octets
+from dissectors.modbus.layout import MESSAGES
+from dissectors.modbus.lengths import MAX_FRAME, MIN_FRAME, MORE, Octets, is_told_by_three
 from dissectors.modbus.past import Past
 from dissectors.modbus.ranges import AGREEMENTS
 
@@ -96,8 +97,28 @@ _EITHER: Final = tuple((LengthGuess(length, True, True),) for length in range(MA
 
 def readings(octets: Octets, start: int, end: int) -> tuple[LengthGuess, ...]:
     """The predicted lengths of a frame that begins at `start`, shorter first; looks at [start, end) only."""
-    if end - start < 2:
-        return ()
+    if end - start < 3:
+        return _readings(octets, start, end) if end - start == 2 else ()
+    code = octets[start + 1]
+    if code not in _TOLD_BY_THREE:
+        return _readings(octets, start, end)
+    key = code << 8 | octets[start + 2]
+    told = _told.get(key)
+    if told is None:
+        told = _told[key] = _readings(octets, start, end)
+    return told
+
+
+_TOLD_BY_THREE: Final = {code | EXCEPTION_BIT for code in FUNCTIONS} | {
+    code
+    for code, messages in MESSAGES.items()
+    if is_told_by_three(messages.request) and is_told_by_three(messages.response)
+}
+_told: Final[dict[int, tuple[LengthGuess, ...]]] = {}
+"""By function and the octet behind it: no more than 256 of each."""
+
+
+def _readings(octets: Octets, start: int, end: int) -> tuple[LengthGuess, ...]:
     code = octets[start + 1]
     function = FUNCTIONS.get(code & ~EXCEPTION_BIT)
     if function is None:

@@ -358,7 +358,7 @@ class RtuFramer:
                 at, heard = start - base, False
                 awaited = False
                 if at + 2 <= count:
-                    heard = window.heard(octets[at])
+                    heard = octets[at] in window.units
                     awaited = window.expected is not None and window.expected.is_for(octets, at)
                 whole = whole_stretch(octets, at, count, start, window.past, awaited, heard)
                 if whole is not None:

@@ -11,6 +11,7 @@ from typing import Final
 
 from dissectors.modbus.notation import (
     CHECK,
+    HEAD,
     Counted,
     FieldPlace,
     Means,
@@ -48,6 +49,14 @@ def length_of(message: Message) -> Length:
     if selector is None or selector.field.only is None:
         return length
     return _selected(selector.at, selector.field.only, length)
+
+
+def is_told_by_three(message: Message) -> bool:
+    """Whether the first three octets of a message tell its length, whatever they are."""
+    count = counted(message)
+    if count is not None:
+        return count.count.at == HEAD and count.count.field.size == 1
+    return fixed_length(message) is not None and first(message, Means.SELECTOR) is None
 
 
 def most_of(count: Counted) -> int:

@@ -111,10 +111,6 @@ class RtuWindow:
         """Number of proved silences strictly between two positions."""
         return sum(start < cut < end for cut in self.cuts)
 
-    def heard(self, unit: int) -> bool:
-        """Whether good frames named this station."""
-        return unit in self.units
-
     def start_bits(self) -> int:
         """Evidence that a frame begins with the window; the begin of the capture is as good as silence."""
         if self._start is None:
@@ -259,7 +255,8 @@ class RtuWindow:
 
     def _found(self, count: int) -> FoundBy:
         base, ends = self.base, self.end == count
-        self.start_bits()
+        if self._start is None:
+            self.start_bits()
         if self.cuts:
             if self.inside(base, base + count):
                 return FoundBy.JOINED
