@@ -24,18 +24,18 @@ import struct
 from typing import NamedTuple
 
 from dissectors.bacnet.frame_types import HEADER, PREAMBLE, is_encoded, total
+from dissectors.bacnet.held_octets import NAMED, WAIT, HeldOctets
 from dissectors.bacnet.limits import (
-    FRAME_ABORT_BITS,
     MAX_DATA,
     MAX_ENCODED,
     MIN_ENCODED,
     T_FRAME_ABORT_MAX,
     T_NO_TOKEN,
 )
-from dissectors.bacnet.mending import after_spoilt_preamble, body_is_good, header_is_good, is_like_header, mended
+from dissectors.bacnet.mending import after_spoilt_preamble, body_is_good, header_is_good, is_like_header
 from dissectors.checksums import crc8_mstp
-from dissectors.frame import Check, Chunk, Damage, Event, FoundBy, Frame, LineError, Noise, Place, Reason, Repair
-from dissectors.framer import UNKNOWN_SILENCE, OctetWindow, Taken
+from dissectors.frame import Check, Chunk, Damage, Event, FoundBy, Repair
+from dissectors.framer import UNKNOWN_SILENCE
 from dissectors.line import Timing
 
 __all__ = ["NOISE_MAX", "MstpFramer", "body_is_good", "header_is_good", "parse_header"]
@@ -44,8 +44,6 @@ NOISE_MAX = 1024
 """Most octets in one Noise event."""
 
 _PIECE = 4096  # octets of a chunk taken at once: bounds memory and keeps the window cheap to cut
-_NAMED = 4  # preamble, type, destination: a frame has begun, and whose turn it was says who sent it
-_WAIT = -1
 
 
 class _Mended(NamedTuple):
@@ -55,24 +53,14 @@ class _Mended(NamedTuple):
     repair: Repair | None
 
 
-class MstpFramer:
+class MstpFramer(HeldOctets):
     """Sans-I/O framer for MS/TP; see the rules above and `dissectors.framer` for the contract."""
 
     protocol = "mstp"
 
     def __init__(self, timing: Timing) -> None:
-        self._window = OctetWindow(timing)
-        self._char = timing.char
-        self._pause = timing.line.bits(FRAME_ABORT_BITS)
-        self._least = min(self._pause, T_FRAME_ABORT_MAX)
-        self._silences: list[tuple[int, int]] = []  # octets of the window with so much proved silence before them
-        self._noise = 0  # octets at the front of the window that begin no frame
-        self._skipped = 0  # octets of noise given out since the last frame
-        self._after_frame = False  # the event before was a frame
+        super().__init__(timing)
         self._needs_pause = 0  # the silence that decides what is held; 0 while nothing is held
-        self._clear = (0, 0)  # between these places of the window no good header begins
-        self._plain = 0  # octets of the good frame without silence inside at the front of the window, 0 unknown
-        self._awaited = 0  # length of the window below which octets without silence before them decide nothing
 
     def feed(self, chunk: Chunk) -> list[Event]:
         """Take one read; give the events it completes."""
@@ -89,14 +77,6 @@ class MstpFramer:
             self._append(_part(chunk, begin, end, self._char))
             events += self._drain(0, final=False)
         return events
-
-    def _append(self, chunk: Chunk) -> None:
-        index = len(self._window.octets)
-        self._window.append(chunk)
-        if chunk.octets:
-            silence = self._window.newest_silence
-            if silence >= self._least:
-                self._silences.append((index, silence))
 
     def advance(self, now: int) -> list[Event]:
         """Say that no read returned up to `now`; give what the silence completes."""
@@ -134,7 +114,7 @@ class MstpFramer:
                 return None
             if not size and octets[:2] != PREAMBLE[: len(octets)]:
                 mended_frame = self._spoilt_preamble(quiet, final)
-                if mended_frame == _WAIT:
+                if mended_frame == WAIT:
                     self._needs_pause = self._pause
                     return None
                 if isinstance(mended_frame, _Mended):
@@ -151,7 +131,7 @@ class MstpFramer:
                     return self._take_noise(before_frame=False) if final or quiet >= self._pause else None
             frame = self._frame_at(at, quiet, final) if octets[at] == PREAMBLE[0] else 1
             if isinstance(frame, int):
-                if frame == _WAIT:
+                if frame == WAIT:
                     return None
                 self._noise += frame
             elif at:  # the noise before it goes first; the frame is found again at the front
@@ -176,7 +156,7 @@ class MstpFramer:
         return size
 
     def _spoilt_preamble(self, quiet: int, final: bool) -> _Mended | int | None:
-        """Rule 5 at the front of the window, where a frame may begin: the frame, _WAIT, or None where there is none."""
+        """Rule 5 at the front of the window, where a frame may begin: the frame, WAIT, or None where there is none."""
         octets = self._window.octets
         if self._skipped and not self._window.silence(0)[0] >= self._pause:
             return None  # in the middle of noise
@@ -188,14 +168,14 @@ class MstpFramer:
         spoilt = after_spoilt_preamble(octets[: min(HEADER, stop)])
         if spoilt is None:
             undecided = not ended and stop < HEADER and PREAMBLE not in octets
-            return _WAIT if undecided else self._like_header(stop, ended)
+            return WAIT if undecided else self._like_header(stop, ended)
         at, length, flaw = spoilt
         begin = at + HEADER - 2
         size = begin + (length + 2 if length else 0)
         if length and self._good_header(1, min(size, stop), stop) is not None:
             return None
         if size > stop:
-            return None if ended else _WAIT
+            return None if ended else WAIT
         whole = PREAMBLE + bytes(octets[at:size])
         if not body_is_good(whole[2], length, whole[HEADER:]):
             return None
@@ -210,10 +190,10 @@ class MstpFramer:
             return whole if header_is_good(octets[HEADER : 2 * HEADER]) else None
         if stop == HEADER and ended:
             return whole
-        return None if ended or not PREAMBLE.startswith(bytes(octets[HEADER : HEADER + 2])) else _WAIT
+        return None if ended or not PREAMBLE.startswith(bytes(octets[HEADER : HEADER + 2])) else WAIT
 
     def _frame_at(self, at: int, quiet: int, final: bool) -> int | tuple[int, Check, Damage | None, FoundBy]:
-        """The frame at a 55: (octets, check, damage, found), or how many octets here are noise, or _WAIT."""
+        """The frame at a 55: (octets, check, damage, found), or how many octets here are noise, or WAIT."""
         octets = self._window.octets
         stop, ended = self._reach(at, quiet, final)
         have = stop - at
@@ -222,7 +202,7 @@ class MstpFramer:
         if have < HEADER:
             if not ended:
                 return self._await(at, at + (HEADER if have >= 2 else 2))
-            named = have >= _NAMED and octets[at + 2 : at + 4] != PREAMBLE
+            named = have >= NAMED and octets[at + 2 : at + 4] != PREAMBLE
             return (have, Check.ABSENT, Damage.SHORT, self._found(at)) if named else 1
         frame_type, length = octets[at + 2], octets[at + 5] << 8 | octets[at + 6]
         if crc8_mstp(bytes(octets[at + 2 : at + 7])) != octets[at + 7]:
@@ -232,8 +212,8 @@ class MstpFramer:
         size = total(length)
         cut = self._restart(at, min(at + size, stop), stop, ended)
         if cut is not None:
-            if cut == _WAIT:
-                return _WAIT
+            if cut == WAIT:
+                return WAIT
             return cut - at, Check.ABSENT, Damage.RESTARTED, self._found(at)
         if have < size:
             return self._incomplete(at, size, stop, ended)
@@ -251,7 +231,7 @@ class MstpFramer:
         if after == len(octets):
             if not ended and quiet < self._pause:
                 self._needs_pause = self._pause
-                return _WAIT
+                return WAIT
         elif octets[after] == 0xFF and self._window.silence(after)[0] < self._pause:
             size += 1
         damage = None
@@ -262,7 +242,7 @@ class MstpFramer:
         return size, Check.GOOD, damage, found
 
     def _restart(self, at: int, end: int, stop: int, ended: bool) -> int | None:
-        """Where rule 3 ends the frame at `at` before `end`; _WAIT when the header there is not whole yet."""
+        """Where rule 3 ends the frame at `at` before `end`; WAIT when the header there is not whole yet."""
         begin = at + HEADER
         while (silent := self._silence_in(begin, end, self._pause)) is not None:
             if silent + HEADER <= stop:
@@ -271,7 +251,7 @@ class MstpFramer:
                     return silent if first is None else first
             elif not ended and PREAMBLE.startswith(bytes(self._window.octets[silent : min(silent + 2, stop)])):
                 self._needs_pause = T_NO_TOKEN
-                return _WAIT
+                return WAIT
             begin = silent + 1
         return None
 
@@ -280,7 +260,7 @@ class MstpFramer:
         self._needs_pause = T_NO_TOKEN
         heard = len(self._window.octets)
         self._awaited = 0 if self._silences and self._silence_in(at + 1, heard, 0) is not None else end
-        return _WAIT
+        return WAIT
 
     def _incomplete(
         self, at: int, size: int, stop: int, ended: bool
@@ -296,7 +276,7 @@ class MstpFramer:
         cut = self._good_header(at + HEADER, at + size, stop)
         if cut is None and not ended and self._undecided_header(at + HEADER, at + size, stop):
             self._needs_pause = T_NO_TOKEN
-            return _WAIT
+            return WAIT
         silent = self._silence_in(at + 1, at + size if cut is None else cut, T_FRAME_ABORT_MAX)
         if silent is not None:
             return max(silent - at, 1), Check.ABSENT, Damage.TIMEOUT, self._found(at)
@@ -314,14 +294,14 @@ class MstpFramer:
         limit = at + (total(length) if plausible else HEADER)
         cut = self._good_header(at + 1, min(limit, stop), stop)
         again = self._next_preamble(at, min(limit, stop) if cut is None else cut, stop, ended)
-        if again == _WAIT:
+        if again == WAIT:
             self._needs_pause = T_NO_TOKEN
-            return _WAIT
+            return WAIT
         cut = cut if again is None else again
         if cut is None:
             if not ended and (limit > stop or self._undecided_header(at + 1, limit, stop)):
                 self._needs_pause = T_NO_TOKEN
-                return _WAIT
+                return WAIT
             if limit <= stop and body_is_good(frame_type, length, bytes(octets[at + HEADER : limit])):
                 return limit - at, Check.BAD, Damage.HEADER, self._found(at)
             cut = min(limit, stop)
@@ -329,7 +309,7 @@ class MstpFramer:
         if silent is not None:
             cut = silent
         have = cut - at
-        if have < _NAMED:
+        if have < NAMED:
             return have
         if have < HEADER:
             return have, Check.ABSENT, Damage.RESTARTED, self._found(at)
@@ -344,140 +324,6 @@ class MstpFramer:
         if cut is not None:
             return cut, True
         return length, final or quiet >= T_NO_TOKEN
-
-    def _silence_in(self, begin: int, end: int, limit: int) -> int | None:
-        """The first octet of [begin, end) with at least `limit` of proved silence before it."""
-        for index, silence in self._silences:
-            if begin <= index < end and silence >= limit:
-                return index
-        return None
-
-    def _next_preamble(self, at: int, end: int, stop: int, ended: bool) -> int | None:
-        """The first preamble before `end` that ends the frame at `at`, whose header is bad.
-
-        It stands directly after proved silence, or where a frame without data ends or would, had it lost octets. _WAIT
-        where its second octet may yet come.
-        """
-        octets = self._window.octets
-        nearest = octets.find(PREAMBLE, at + _NAMED, min(at + HEADER + 2, end + 1, stop))
-        if nearest != -1:
-            return nearest
-        if not ended and at + _NAMED < stop <= at + HEADER and octets[stop - 1] == PREAMBLE[0]:
-            return _WAIT
-        begin = at + 2
-        while self._silences and (silent := self._silence_in(begin, end, self._pause)) is not None:
-            if octets[silent : min(silent + 2, stop)] == PREAMBLE:
-                return silent
-            if not ended and silent + 1 == stop and octets[silent] == PREAMBLE[0]:
-                return _WAIT
-            begin = silent + 1
-        return None
-
-    def _good_header(self, begin: int, end: int, stop: int) -> int | None:
-        """The first place in [begin, end) where a good header begins that is whole before `stop`."""
-        octets = self._window.octets
-        clear_from, clear_to = self._clear
-        known = clear_from <= begin <= clear_to
-        at = octets.find(PREAMBLE, clear_to if known else begin, min(end + 1, stop))
-        while at != -1 and at < end and at + HEADER <= stop:
-            if header_is_good(octets[at : at + HEADER]):
-                return at
-            at = octets.find(PREAMBLE, at + 1, min(end + 1, stop))
-        looked = min(end, stop - HEADER + 1)
-        if looked > begin and (not known or looked > clear_to):
-            self._clear = (clear_from if known else begin), looked
-        return None
-
-    def _undecided_header(self, begin: int, end: int, stop: int) -> bool:
-        """Whether a header may begin in [begin, end) that is not whole before `stop`."""
-        octets = self._window.octets
-        for at in range(max(begin, stop - HEADER + 1), min(end, stop)):
-            if octets[at] == PREAMBLE[0] and (at + 1 >= stop or octets[at + 1] == PREAMBLE[1]):
-                return True
-        return False
-
-    def _found(self, at: int) -> FoundBy:
-        if (at or self._skipped) and self._window.silence(at)[0] < self._pause:
-            return FoundBy.SPLIT
-        return FoundBy.LENGTH
-
-    # Giving out
-
-    def _take_frame(
-        self, size: int, check: Check, damage: Damage | None, found: FoundBy, repair: Repair | None = None
-    ) -> Frame:
-        octets = self._window.octets
-        expected = None
-        if size >= HEADER and (damage is not Damage.HEADER):
-            expected = total(octets[5] << 8 | octets[6])
-        flags: tuple[str, ...] = ()
-        if check is Check.GOOD and expected is not None and size > expected:
-            flags = ("trailing-pad",)
-        taken = self._take(size)
-        skipped, self._skipped = self._skipped, 0
-        self._plain = 0
-        self._after_frame = True
-        if repair is None and check is not Check.GOOD:
-            repair = mended(taken.octets, damage)
-        return Frame(
-            "mstp",
-            taken.octets,
-            taken.start,
-            taken.end,
-            check,
-            found,
-            damage,
-            expected,
-            skipped,
-            taken.slack,
-            taken.marks,
-            flags,
-            repair,
-        )
-
-    def _take_plain(self, size: int) -> Frame:
-        """A good frame without pad, as `_look` has found it."""
-        found = self._found(0) if self._skipped else FoundBy.LENGTH
-        taken = self._take(size)
-        skipped, self._skipped = self._skipped, 0
-        self._plain = 0
-        self._after_frame = True
-        octets, start, end, slack, marks = taken
-        return Frame("mstp", octets, start, end, Check.GOOD, found, None, size, skipped, slack, marks)
-
-    def _take(self, count: int) -> Taken:
-        self._awaited = 0
-        if self._silences:
-            self._silences = [(index - count, silence) for index, silence in self._silences if index >= count]
-        if self._clear[1]:
-            self._clear = max(0, self._clear[0] - count), max(0, self._clear[1] - count)
-        return self._window.take(count)
-
-    def _take_noise(self, before_frame: bool) -> Noise:
-        window, count = self._window, self._noise
-        place = Place.BETWEEN
-        if self._after_frame and window.silence(0)[1] < self._pause:
-            place = Place.AFTER
-        elif before_frame and window.silence(count)[1] < self._pause:
-            place = Place.BEFORE
-        taken = self._take(count)
-        self._noise = 0
-        self._skipped += count
-        self._after_frame = False
-        reason = _reason(taken.octets, place, any(mark.error & LineError.BREAK for mark in taken.marks))
-        return Noise(taken.octets, taken.start, taken.end, place, reason, taken.marks)
-
-
-def _reason(octets: bytes, place: Place, broken: bool) -> Reason:
-    if broken:
-        return Reason.BREAK
-    if not octets.strip(b"\x00"):
-        return Reason.ZEROS if place is Place.AFTER else Reason.NO_FRAME
-    if not octets.strip(b"\xff"):
-        return Reason.PAD
-    if octets[0] == PREAMBLE[0] and (len(octets) == 1 or octets[1] in PREAMBLE):
-        return Reason.FALSE_START
-    return Reason.NO_FRAME
 
 
 def _part(chunk: Chunk, begin: int, end: int, char: int) -> Chunk:

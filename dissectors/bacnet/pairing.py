@@ -19,12 +19,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from dissectors.bacnet.data_exchanges import LATE_WITHIN
 from dissectors.bacnet.exchange import Exchange
 from dissectors.bacnet.frame_types import HEADER
 from dissectors.bacnet.open_exchanges import POSTPONED_FOR, REMEMBERED, SEGMENTS_FOR
 from dissectors.bacnet.past_exchanges import Entry, Nets, PastExchanges
 from dissectors.bacnet.placed_rows import CODE, POLL_REPLY, REQUEST, TOKEN, WAITS, PlacedRows
-from dissectors.bacnet.tracker import LATE_WITHIN, MstpTracker
+from dissectors.bacnet.tracker import MstpTracker
 from dissectors.bacnet.turn_columns import TaughtTurns
 from dissectors.columns import NONE, ROLES, FrameColumns, PlacementColumns, TransactionColumns
 from dissectors.frame import Frame, Role

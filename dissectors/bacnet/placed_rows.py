@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dissectors.bacnet.data_exchanges import LATE_WITHIN
 from dissectors.bacnet.frame_types import HEADER, FrameType
 from dissectors.bacnet.limits import BROADCAST, T_NO_TOKEN, T_USAGE_DELAY, TURNAROUND_BITS
 from dissectors.bacnet.npdu_columns import heads
 from dissectors.bacnet.open_exchanges import REMEMBERED
 from dissectors.bacnet.past_exchanges import NO_KEY
-from dissectors.bacnet.tracker import LATE_WITHIN
 from dissectors.columns import NONE, VERDICTS, FrameColumns, TransactionColumns
 from dissectors.tracker import Verdict
 

@@ -17,7 +17,8 @@ from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, readable_adu
 from dissectors.modbus.exchange import Exchange, Seen
 from dissectors.modbus.exchange_columns import exchanges, placed
 from dissectors.modbus.exchange_memory import heard, holding, outlives, passed
-from dissectors.modbus.tracker import ModbusTracker, PassedBy
+from dissectors.modbus.tracker import ModbusTracker
+from dissectors.modbus.tracker_memory import PassedBy
 from dissectors.tracker import Tracker
 
 

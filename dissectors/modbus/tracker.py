@@ -18,25 +18,18 @@ may still answer. (Some battery systems are asked at one address and always answ
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 from dissectors.frame import Event, Header, Noise, Reason, Role
-from dissectors.line import Timing
 from dissectors.modbus.damaged_unit import names_another, unit_of
 from dissectors.modbus.doubts import is_full
-from dissectors.modbus.echoes import MOST_VOTES, Echoes
 from dissectors.modbus.envelope import readable_adu
 from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, echo_of
-from dissectors.modbus.exchanges import FIRST_SEEN, Exchanges
+from dissectors.modbus.exchanges import FIRST_SEEN
 from dissectors.modbus.functions import BROADCAST
-from dissectors.modbus.learned_timing import WRITE, LearnedTiming
 from dissectors.modbus.pairing import another_function, is_listen_only, is_restart, mismatch
-from dissectors.modbus.promptness import Promptness
+from dissectors.modbus.tracker_memory import TrackerMemory
 from dissectors.tracker import Placement, Tracked, Transaction, Verdict
-
-if TYPE_CHECKING:
-    from dissectors.modbus.exchange_memory import Known, Passed
 
 _IMPATIENT = "the master went on long before its timeout: the answer may have been missed at this tap"
 _PERHAPS_ANSWER = "the master went on long before its timeout: perhaps an answer whose request was missed at this tap"
@@ -49,45 +42,8 @@ _GARBLE = 3  # so many octets of noise in place of an answer are a damaged answe
 _QUIET_NOISE = frozenset((Reason.ZEROS, Reason.BREAK, Reason.PAD))
 
 
-@dataclass(frozen=True, slots=True)
-class PassedBy:
-    """Exchanges that went by the tracker. `first`: the request of the first. `newest`: the last that were answered, and
-    the last of all; `given_up`: the last that were not. `heard`: of each unit that answered, the last transaction that
-    it did. `count`: of all. `end`: ns, of the last frame. `units`: that were asked.
-    """
-
-    first: Seen
-    newest: list[Exchange]
-    given_up: list[Exchange]
-    heard: dict[int, int]
-    count: int
-    end: int
-    units: set[int]
-
-
-class ModbusTracker:
-    """Implements `dissectors.tracker.Tracker` for RTU and ASCII lines.
-
-    `silence`: ns, the shortest time in which a station can begin an answer; 3.5 characters where not given (RTU).
-    `learnt`: what the traffic so far told of response times, timeout and pauses.
-    """
-
-    def __init__(self, timing: Timing, silence: int | None = None) -> None:
-        self.learnt = LearnedTiming(timing)
-        self._timing = timing
-        self._silence = 7 * timing.char // 2 if silence is None else silence
-        self._times = Promptness(self.learnt, self._silence, timing.latency)
-        self._echoes = Echoes(timing, self._silence, self.learnt)
-        self._held = Exchanges(self.learnt, self._echoes)
-        self._last_end: int | None = None  # of the newest frame
-        self._last_was_answer = False
-        self._units: set[int] = set()  # named in good frames
-        self._mute: set[int] = set()  # units in listen-only mode
-
-    @property
-    def timeout(self) -> int | None:
-        """How long the master waits for an answer, ns; None while unlearnt."""
-        return self.learnt.timeout
+class ModbusTracker(TrackerMemory):
+    """Implements `dissectors.tracker.Tracker` for RTU and ASCII lines."""
 
     # ---- the contract
 
@@ -352,79 +308,6 @@ class ModbusTracker:
             return False
         room = self.learnt.too_soon(self._silence) + _REQUEST_OCTETS * self._timing.char
         return seen.frame.start - self._last_end < room + (self.learnt.fastest(last.unit) or 0) // 2
-
-    # ---- learning
-
-    def _learn_from_next(self, seen: Seen, sure: bool) -> None:
-        """A request after all that came before it: how long the master waited, paused, and whether a copy answered."""
-        before, last = self._held.open, self._held.last
-        if before is not None:
-            undisturbed = not (before.disturbed or before.fault or before.garble or before.silent)
-            if sure and before.sure and undisturbed:
-                self.learnt.unanswered(before.gap(seen.frame.start), before.octets == seen.octets)
-        elif last is not None:
-            if last.copied is not None and last.octets != seen.octets:
-                self.learnt.answered(last.unit, last.pace, last.copied)
-            last.copied = None
-            asks = sure or seen.unit != last.unit
-            if asks and last.answered and self._last_was_answer and self._last_end is not None:
-                cycle = seen.frame.start - last.request.frame.start
-                self.learnt.paused(max(0, seen.frame.start - self._last_end), cycle)
-
-    def _learn_from_answer(self, request: Exchange, seen: Seen, why: str | None) -> None:
-        gap = request.gap(seen.frame.start)
-        if request.octets == seen.octets:
-            request.copied = gap
-        elif request.sure and seen.header.role is Role.RESPONSE and not (why or request.fault):
-            self.learnt.answered(request.unit, request.pace, gap)
-            self._echoes.learn(request.echoed)
-
-    def _note_mode(self, request: Exchange) -> None:
-        """Listen-only mode begins with its command and ends with a restart, or when the unit speaks again."""
-        if is_restart(request.octets):
-            if request.unit == BROADCAST:
-                self._mute.clear()
-            self._mute.discard(request.unit)
-        elif is_listen_only(request.octets):
-            self._mute.add(request.unit)
-        elif request.unit in self._mute:
-            request.remark = f"unit {request.unit} was put into listen-only mode"
-
-    # ---- exchanges that went by without it (seam.py)
-
-    def known(self, start: int) -> Known | None:
-        """What it has learnt that a regular exchange depends on whose request begins at `start`; None: it waits."""
-        from dissectors.modbus.exchange_memory import Known
-
-        held = self._held
-        if not held.is_at_rest:
-            return None
-        writes, slowest, last = self.learnt.write_times(), self.learnt.slowest, held.last
-        if last is not None and last.copied is not None and last.pace == WRITE:  # it teaches with the next request
-            writes[last.unit] = (*writes.get(last.unit, ()), last.copied)
-            slowest = max(slowest, last.copied)
-        pauses = self.learnt.pauses if self._last_end is None else (*self.learnt.pauses, start - self._last_end)
-        return Known(self.timeout, self._echoes.usual, writes, self.learnt.waits, slowest, max(pauses, default=0))
-
-    @property
-    def next_tx(self) -> int:
-        """The number that the next transaction will have."""
-        return self._held.next_tx
-
-    def pass_by(self, went: Passed, by: PassedBy) -> None:
-        """Go on as if it had tracked exchanges that went by."""
-        first = by.first
-        self._learn_from_next(first, first.header.role is not Role.EITHER)
-        for (unit, pace), times in went.times.items():
-            self.learnt.answered_often(unit, pace, times)
-        self.learnt.paused_often(went.pauses)
-        self.learnt.waited(went.unanswered)
-        for _ in range(min(went.sure, MOST_VOTES)):
-            self._echoes.learn(False)
-        self._held.pass_by(by.newest, by.given_up, by.heard, by.count)
-        self._last_end, self._last_was_answer = by.end, by.newest[-1].answered
-        self._mute -= went.units
-        self._units |= by.units
 
     # ---- closing
 

@@ -20,7 +20,8 @@ from dissectors.modbus.envelope import readable_adu
 from dissectors.modbus.exchange import Exchange, Seen
 from dissectors.modbus.exchange_columns import ExchangeColumns, exchanges, placed
 from dissectors.modbus.exchange_memory import heard, holding, outlives, passed
-from dissectors.modbus.tracker import ModbusTracker, PassedBy
+from dissectors.modbus.tracker import ModbusTracker
+from dissectors.modbus.tracker_memory import PassedBy
 from dissectors.tracker import Placement, Transaction
 from sniff import formats
 from tests.bench import bulk_rtu
