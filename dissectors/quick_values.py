@@ -27,10 +27,11 @@ def quickly_made(value: type[_Value]) -> type[_Value]:
     if getattr(value, "__slots__", None) != names or not named.__dataclass_params__.frozen:
         raise TypeError(f"{value.__name__} is not frozen and slotted")
     made = value.__init__
-    space: dict[str, Any] = {"_set": object.__setattr__, "_open": _opened(names), "_closed": value}
+    space: dict[str, Any] = {"_set": object.__setattr__, "_open": _opened(names), "_closed": value, "_made": made}
     body = "".join(f"    self.{name} = {name}\n" for name in names)
     exec(
         f"def __init__(self, {', '.join(names)}):\n"
+        f"    if self.__class__ is not _closed:\n        return _made(self, {', '.join(names)})\n"  # an heir stays one
         f"    _set(self, '__class__', _open)\n{body}    self.__class__ = _closed\n",
         space,
     )

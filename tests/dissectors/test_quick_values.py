@@ -7,7 +7,8 @@ from dataclasses import FrozenInstanceError, dataclass, field, fields, replace
 
 import pytest
 
-from dissectors.frame import Check, FoundBy, Frame
+from dissectors.frame import Check, FoundBy, Frame, Role
+from dissectors.plugin_guard import FailedHeader
 from dissectors.quick_values import quickly_made
 
 
@@ -37,6 +38,20 @@ def test_it_is_made_like_a_plain_one() -> None:
         Quick()  # type: ignore[call-arg]
     with pytest.raises(TypeError, match="fourth"):
         Quick(1, fourth=4)  # type: ignore[call-arg]
+
+
+def test_an_heir_stays_one() -> None:
+    class Bare(Quick):
+        __slots__ = ()
+
+    @dataclass(frozen=True, slots=True)
+    class Longer(Quick):
+        fourth: int = 4
+
+    assert [type(one) for one in (Bare(1), Longer(1), FailedHeader("x", None, None, Role.UNKNOWN, "x"))] == [
+        Bare, Longer, FailedHeader,
+    ]  # fmt: skip
+    assert (Bare(1, third=(3,)).third, Longer(1, fourth=5).fourth) == ((3,), 5)
 
 
 def test_nobody_changes_it_afterwards() -> None:
