@@ -39,6 +39,7 @@ HORIZON: Final = 1 << 14
 _ANSWER_CHARS: Final = 32  # as in learned_timing.py
 _REPEATED_AT_ONCE: Final = 50_000_000  # ns, as in the tracker: no master repeats a request sooner
 _NEVER: Final = 1 << 62
+_UNITS: Final = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,11 +183,11 @@ def passed(found: ExchangeColumns, frames: FrameColumns, place: int, end: int) -
     told = answered & (found.sure[part] | found.copy[part])
     if end > place and found.copy[end - 1]:
         told[-1] = False  # a copy teaches when the next request has come
-    at = np.flatnonzero(told)
+    at = told.nonzero()[0]
     key = unit[at] << 1 | found.writes[part][at]
     order = np.argsort(key, kind="stable")
     gaps, key = found.gap[part][at[order]].tolist(), key[order]
-    ends = np.append(np.flatnonzero(key[1:] != key[:-1]) + 1, len(key)).tolist()
+    ends = [*((key[1:] != key[:-1]).nonzero()[0] + 1).tolist(), len(key)]
     times, begin = {}, 0
     for behind in ends if gaps else ():
         one = int(key[begin])
@@ -194,22 +195,24 @@ def passed(found: ExchangeColumns, frames: FrameColumns, place: int, end: int) -
         begin = behind
     asks = answered[:-1] & (found.sure[part][1:] | (frames.role[found.request[part][1:]] == TO_ALL))
     asks |= answered[:-1] & (unit[1:] != unit[:-1])
-    at = place + 1 + np.flatnonzero(asks)[-PAUSES:]
+    at = place + 1 + asks.nonzero()[0][-PAUSES:]
     start = frames.start[found.request[at]]
     pause = np.maximum(start - frames.end[found.request[at - 1] + found.answered[at - 1]], 0)
     cycle = start - frames.start[found.request[at - 1]]
-    answers = np.flatnonzero(answered[::-1])
-    units, newest = np.unique(unit[::-1][answers], return_index=True)
-    backwards = answers[newest]
+    answers = answered.nonzero()[0]
+    newest = np.full(_UNITS, -1)
+    newest[unit[answers]] = answers  # of several the last stays
+    units = (newest >= 0).nonzero()[0]
+    unanswered = found.unanswered[part].nonzero()[0]
     return Passed(
         times,
         list(zip(pause.tolist(), cycle.tolist(), strict=True)),
         int((found.sure[part] & answered).sum()),
-        (place + np.flatnonzero(answered)[-ANSWERED:]).tolist(),
-        frozenset(np.flatnonzero(np.bincount(unit[answered])).tolist()),
-        (place + np.flatnonzero(found.unanswered[part])[-GIVEN_UP:]).tolist(),
-        found.gap[part][found.unanswered[part]][-SAMPLES:].tolist(),
-        list(zip(units.tolist(), (end - 1 - backwards).tolist(), strict=True)),
+        (place + answers[-ANSWERED:]).tolist(),
+        frozenset(units.tolist()),
+        (place + unanswered[-GIVEN_UP:]).tolist(),
+        found.gap[part][unanswered[-SAMPLES:]].tolist(),
+        list(zip(units.tolist(), (place + newest[units]).tolist(), strict=True)),
     )
 
 

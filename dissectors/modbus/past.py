@@ -7,7 +7,7 @@ bounded.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Collection
+from collections.abc import Iterable
 from typing import Final
 
 from dissectors.frame import Flaw
@@ -19,7 +19,9 @@ KNOWN_REQUEST: Final = 14
 KNOWN_LENGTH: Final = 6
 """Bits for an answer as long as one that this station gave to this function before, where lengths differ at all."""
 
-_MOST_REQUESTS: Final = 512
+MOST_REQUESTS: Final = 512
+"""Requests that are remembered: those that came last."""
+
 _MOST_LENGTHS: Final = 4096
 _CONSTANT: Final = 4
 """So many frames of one length, and none of another, make it the length of their kind."""
@@ -35,7 +37,7 @@ class Past:
     __slots__ = ("_calls", "_constant", "_flaws", "_lengths", "_requests", "_strays", "learnt")
 
     def __init__(self) -> None:
-        self._requests: OrderedDict[bytes, None] = OrderedDict()  # in the order they came first
+        self._requests: OrderedDict[bytes, None] = OrderedDict()  # in the order they came last
         self._lengths: dict[int, int] = {}  # unit, function, direction → a bit for each length
         self._constant: dict[int, tuple[int, int]] = {}  # of functions of unknown layout: first length, how often
         self._calls: set[int] = set()  # unit and function of all requests
@@ -89,9 +91,10 @@ class Past:
         known = code & ~EXCEPTION_BIT in FUNCTIONS
         if request:
             self._calls.add(octets[0] << 8 | code)
-        if request and octets not in self._requests:
+        if request:
             self._requests[octets] = None
-            if len(self._requests) > _MOST_REQUESTS:
+            self._requests.move_to_end(octets)
+            if len(self._requests) > MOST_REQUESTS:
                 self._requests.popitem(last=False)
         if (known and request) or code & EXCEPTION_BIT or code in ANSWER_LENGTHS:
             return
@@ -106,19 +109,22 @@ class Past:
                 (length, min(times + 1, _CONSTANT)) if length == len(octets) and times >= 0 else (0, -1)
             )
 
-    def note_requests(self, asked: Collection[bytes]) -> None:
-        """Good requests of functions whose layout is known: the same as `note` of one after the other."""
-        for _ in asked:
+    def note_requests(self, count: int, newest: Iterable[bytes], calls: Iterable[int]) -> None:
+        """So many good requests of functions whose layout is known: the same as `note` of one after the other.
+
+        `newest`: the last MOST_REQUESTS of them that differ, each in the order it came last. `calls`: units and
+        functions of all, unit << 8 | function."""
+        for _ in range(count):
             if not self._strays >> 6:
                 break
             self._strays -= self._strays >> 6
-        requests, calls = self._requests, self._calls
-        for octets in asked:
-            if octets not in requests:
-                calls.add(octets[0] << 8 | octets[1])
-                requests[octets] = None
-                if len(requests) > _MOST_REQUESTS:
-                    requests.popitem(last=False)
+        self._calls.update(calls)
+        requests = self._requests
+        for octets in newest:
+            requests[octets] = None
+            requests.move_to_end(octets)
+        for _ in range(len(requests) - MOST_REQUESTS):
+            requests.popitem(last=False)
 
     def note_stray_zero(self) -> None:
         """A zero behind a frame that cannot be its last octet."""

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from dissectors.columns import ROLES, FrameColumns, Octets, Times
 from dissectors.frame import Role
 from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
-from dissectors.modbus.past import Past
+from dissectors.modbus.past import MOST_REQUESTS, Past
 
 _RESPONSE = ROLES.index(Role.RESPONSE)
 _IS_KNOWN = np.array([code & ~EXCEPTION_BIT in FUNCTIONS and not code & EXCEPTION_BIT for code in range(256)])
@@ -38,14 +38,30 @@ def learn(past: Past, units: set[int], frames: FrameColumns, octets: Octets) -> 
     begins, lengths = begins[~is_answer], lengths[~is_answer]
     if not len(begins):
         return
+    if _IS_KNOWN[octets[begins + 1]].all():
+        calls = np.unique(octets[begins].astype(np.int64) << 8 | octets[begins + 1])
+        past.note_requests(len(begins), _newest(octets, begins, lengths), calls.tolist())
+        return
+    for one in _each(octets, begins, lengths):
+        past.note(one, request=True)
+
+
+def _newest(octets: Octets, begins: Times, lengths: Times) -> list[bytes]:
+    """The last requests that differ, no more than are remembered, in the order in which each came last."""
+    newest: dict[bytes, None] = {}
+    end = len(begins)
+    while end and len(newest) < MOST_REQUESTS:
+        begin = max(0, end - MOST_REQUESTS)
+        newest |= dict.fromkeys(reversed(_each(octets, begins[begin:end], lengths[begin:end])))
+        end = begin
+    return list(newest)[:MOST_REQUESTS][::-1]
+
+
+def _each(octets: Octets, begins: Times, lengths: Times) -> list[bytes]:
+    """Frames as octets."""
     said = octets[int(begins[0]) : int(begins[-1] + lengths[-1])].tobytes()
     first = begins - begins[0]
-    whole = [said[begin:end] for begin, end in zip(first.tolist(), (first + lengths).tolist(), strict=True)]
-    if _IS_KNOWN[octets[begins + 1]].all():
-        past.note_requests(whole)
-        return
-    for one in whole:
-        past.note(one, request=True)
+    return [said[begin:end] for begin, end in zip(first.tolist(), (first + lengths).tolist(), strict=True)]
 
 
 def _new_answers(past: Past, octets: Octets, begins: Times, lengths: Times) -> list[int]:
