@@ -198,6 +198,14 @@ def candidate(stretch: bytes, reading: LengthGuess, start: int) -> Candidate:
     return Candidate(start, reading.length, bits, stretch[0], reading.request, reading.response, stretch, zeros)
 
 
+def begins_good(octets: Octets, start: int, end: int) -> bool:
+    """Whether a good frame of a predicted length begins at `start` and is over before `end`."""
+    return any(
+        MORE < length < end - start and not crc16_modbus(bytes(octets[start : start + length]))
+        for length, _, _ in readings(octets, start, end)
+    )
+
+
 def zeros_follow_good(stretch: bytes) -> int:
     """Of a stretch with a good CRC that is a shorter good frame and zeros: how many zeros; else 0."""
     count = len(stretch)

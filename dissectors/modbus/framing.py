@@ -33,6 +33,7 @@ from dissectors.modbus.candidates import (
     Candidate,
     CandidateFinder,
     LengthGuess,
+    begins_good,
     exception_bits,
     is_text,
     lacks_zeros,
@@ -265,8 +266,10 @@ class RtuFramer:
                 hopes = reading  # of two readings only the longer can be the one that is open
         if best is None or best_worth < 0:
             return False
-        if hope and hopes is not None and best.length != end and self._hope(hopes, count) > best_worth:
-            return False
+        if hope and hopes is not None and best.length != end:
+            followed = begins_good(octets, best.length, count)  # then the longer one would make two of chance
+            if not followed and self._hope(hopes, count) > best_worth:
+                return False
         window.take_frame(best.length, best.request, best.response)
         return True
 

@@ -255,16 +255,16 @@ class RtuWindow:
 
     def _found(self, count: int) -> FoundBy:
         base, ends = self.base, self.end == count
-        if self._start is None:
-            self.start_bits()
         if self.cuts:
             if self.inside(base, base + count):
                 return FoundBy.JOINED
             end_proved = (ends and self.end_proved) or base + count in self.cuts
         else:
             end_proved = ends and self.end_proved
-        if end_proved and self._start_proved:
-            return FoundBy.GAP
+        if end_proved:
+            self.start_bits()  # it says whether silence before is proved, too
+            if self._start_proved:
+                return FoundBy.GAP
         touched = self._octets.gap(0) < self._t15 or (not ends and self._octets.gap(count) < self._t15)
         return FoundBy.SPLIT if touched else FoundBy.LENGTH
 
