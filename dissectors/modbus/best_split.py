@@ -32,7 +32,7 @@ from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple, Protocol
 
-from dissectors.modbus.candidates import ANY_END, CRC_BITS, ZERO_TAIL, Candidate, LengthGuess, Pending, octet_hope
+from dissectors.modbus.candidates import ANY_END, ZERO_TAIL, Candidate, Pending
 from dissectors.modbus.functions import EXCEPTION_BIT
 from dissectors.modbus.lengths import MIN_FRAME, MORE
 from dissectors.modbus.open_request import LOOSE, REPEATED, SAME_UNKNOWN, Expected, expectation
@@ -164,13 +164,12 @@ class Paths:
         end = path[-1].end
         rivalled = self._is_rivalled(winner)
         hoping: dict[int, _Step] = {}  # paths that would be better than the best if their last frame comes true
-        for start, reading in pending:
-            if start >= end and not rivalled:
+        for each in pending:
+            if each.start >= end and not rivalled:
                 continue  # it follows the best path, whatever becomes of it
-            if self._is_spoken_for(start):
-                total, step = self._hope(start, reading, count)
-                if total > winner.worth:
-                    hoping[id(step)] = step
+            total, step = self._hope(each, count)
+            if step is not None and total > winner.worth:
+                hoping[id(step)] = step
         for start in unfinished:
             total, step = self._open_hope(start)
             if total > winner.worth:
@@ -182,20 +181,6 @@ class Paths:
             while other[:agreed] != path[:agreed]:
                 agreed -= 1
         return path[:agreed]
-
-    def _is_spoken_for(self, start: int) -> bool:
-        """Whether anything but its first octets speaks for a frame that is not complete: of 65536 that nothing speaks
-        for, one becomes a frame."""
-        window = self._window
-        at = start - window.base
-        unit, code = window.octets[at], window.octets[at + 1]
-        return (
-            unit in window.units
-            or code in _WELL_TOLD
-            or start in self._touching
-            or unit << 8 | code & ~EXCEPTION_BIT in self._awaiting
-            or window.edge(start) > 0
-        )
 
     def _is_rivalled(self, winner: _Step) -> bool:
         """Whether another path is so near that what follows could make it the better one."""
@@ -260,20 +245,32 @@ class Paths:
                 options = (*options, awaiting[1][at])
         return options
 
-    def _hope(self, start: int, reading: LengthGuess, count: int) -> tuple[int, _Step]:
-        """The best path that ends in a frame whose CRC may yet be good, and its worth."""
+    def _hope(self, pending: Pending, count: int) -> tuple[int, _Step | None]:
+        """The best path that ends in a frame whose CRC may yet be good, and its worth. None where nothing but its first
+        octets speaks for such a frame: of 65536 of them one becomes a frame."""
+        start, reading, bits = pending
         window = self._window
         octets, at = window.octets, start - window.base
-        length = reading.length if reading.length != MORE else count - at + 1
         unit, code = octets[at], octets[at + 1]
-        bits = CRC_BITS + octet_hope(octets, at, reading) + _standing(window, unit, start, start + length)
-        known = KNOWN_LENGTH if reading.response and window.past.knows_length(unit, code, length) else 0
         edge = window.edge(start)
+        spoken_for = (
+            unit in window.units
+            or edge > 0
+            or code in _WELL_TOLD
+            or start in self._touching
+            or unit << 8 | code & ~EXCEPTION_BIT in self._awaiting
+        )
+        if not spoken_for:
+            return 0, None
+        length = reading.length if reading.length != MORE else count - at + 1
+        bits += _standing(window, unit, start, start + length)
+        known = KNOWN_LENGTH if reading.response and window.past.knows_length(unit, code, length) else 0
         most, best = -1, self._best[0]
         for step in self._options(start, unit, code):
-            own = bits + (ADJACENT if step.end == start else edge)
-            own += max(known, step.expected.hope(octets, at, length) if step.expected is not None else 0)
-            total = step.worth + worth(own, length)
+            own, expected = known, step.expected
+            if expected is not None and expected.unit == unit:
+                own = max(own, expected.hope(octets, at, length))
+            total = step.worth + worth(bits + own + (ADJACENT if step.end == start else edge), length)
             if total > most:
                 most, best = total, step
         return most, best

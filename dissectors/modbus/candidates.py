@@ -79,10 +79,14 @@ class Candidate(NamedTuple):
 
 
 class Pending(NamedTuple):
-    """A stretch that would be a frame if the octets to come make its CRC good. `start` as in Candidate."""
+    """A stretch that would be a frame if the octets to come make its CRC good.
+
+    `start` as in Candidate. `bits`: what its octets and that CRC come to then (`octet_hope`).
+    """
 
     start: int
     reading: LengthGuess
+    bits: int
 
 
 _NOTHING: Final = LengthGuess(-1, False, False)
@@ -306,7 +310,7 @@ class CandidateFinder:
         for pending in waiting:
             self._weigh(known, pending)
         unread, self._unread = self._unread, []
-        for start, told in unread:
+        for start, told, _ in unread:
             self._read_on(known, start, told)
         scan = max(self._scanned, base)
         if base + end - 2 > scan:  # a head is read when its third octet is there: then most lengths are told
@@ -319,14 +323,14 @@ class CandidateFinder:
                 for reading in found:
                     length = reading.length
                     if at + length > end:
-                        self._waiting.append(Pending(base + at, reading))
+                        self._waiting.append(_pending(known, at, base + at, reading))
                     elif not crc16_modbus(known[at : at + length]):
                         self.good.append(candidate(known[at : at + length], reading, base + at))
             self._scanned = base + end - 2
 
     def pending(self) -> list[Pending]:
         """What is not complete yet; length MORE where the octets do not tell it yet."""
-        return self._waiting + [Pending(start, _UNTOLD) for start, _ in self._unread]
+        return self._waiting + [Pending(start, _UNTOLD, bits) for start, _, bits in self._unread]
 
     def _drop(self, base: int) -> None:
         self._base = base
@@ -336,25 +340,30 @@ class CandidateFinder:
 
     def _weigh(self, known: bytes, pending: Pending) -> None:
         """A stretch that is a candidate when it is complete and its CRC is right."""
-        start, reading = pending
+        start, reading, _ = pending
         at = start - self._base
-        stretch = known[at : at + reading.length]
-        if len(stretch) < reading.length:
+        if at + reading.length > len(known):
             self._waiting.append(pending)
-        elif not crc16_modbus(stretch):
+            return
+        stretch = known[at : at + reading.length]
+        if not crc16_modbus(stretch):
             self.good.append(candidate(stretch, reading, start))
 
     def _read_on(self, known: bytes, start: int, told: LengthGuess) -> None:
         """A head some of whose octets were not there when it was read: only what is new in it counts."""
-        more = False
-        for reading in readings(known, start - self._base, len(known)):
+        more, at = False, start - self._base
+        for reading in readings(known, at, len(known)):
             if reading.length == MORE:
                 more = True
             elif reading.length != told.length:
-                self._weigh(known, Pending(start, reading))
+                self._weigh(known, _pending(known, at, start, reading))
                 told = reading
             elif reading != told:
                 other = LengthGuess(reading.length, not told.request, not told.response)
-                self._weigh(known, Pending(start, other))
+                self._weigh(known, _pending(known, at, start, other))
         if more:
-            self._unread.append(Pending(start, told))
+            self._unread.append(_pending(known, at, start, _UNTOLD)._replace(reading=told))
+
+
+def _pending(octets: Octets, at: int, start: int, reading: LengthGuess) -> Pending:
+    return Pending(start, reading, CRC_BITS + octet_hope(octets, at, reading))
