@@ -57,9 +57,9 @@ class SecondProof:
         self._is_asked = False  # whether this window was
 
     @property
-    def is_waiting(self) -> bool:
-        """Whether rows that were seen may yet turn out to be frames of a second protocol."""
-        return self._fresh > 0
+    def known_before(self) -> int | None:
+        """The number of the first row seen that may yet be a second protocol's; None where nothing waits."""
+        return self._first_left if self._fresh else None
 
     def see(self, item: Output | Table | LineEvent) -> None:
         """Take what an engine gave, as rows or as columns."""
@@ -154,7 +154,12 @@ class Proving(Generic[Given]):
         """Take what follows; give what is known."""
         self._proof.see(item)
         self._held.append(item)
-        return [] if self._proof.is_waiting else self._all()
+        first = self._proof.known_before
+        if first is None:
+            return self._all()
+        known = next((at for at, held in enumerate(self._held) if _last_row(held) >= first), len(self._held))
+        given, self._held = self._held[:known], self._held[known:]
+        return given
 
     def close(self) -> list[Given]:
         """Give all that is left."""
@@ -164,6 +169,13 @@ class Proving(Generic[Given]):
     def _all(self) -> list[Given]:
         held, self._held = self._held, []
         return held
+
+
+def _last_row(item: Output | Table | LineEvent) -> int:
+    """The number of the last row of something, -1 where it has none."""
+    if isinstance(item, Table):
+        return item.first + len(item) - 1 if len(item) else -1
+    return item.rows[-1].no if isinstance(item, Output) and item.rows else -1
 
 
 def proving(items: Iterable[Given], proof: SecondProof | None) -> Iterator[Given]:
