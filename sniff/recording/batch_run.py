@@ -10,19 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sniff.recording import scan
-from sniff.recording.batch import Batch
+from sniff.recording.batch import ENTRY, HEAD, Batch
 
 if TYPE_CHECKING:
     from sniff.recording.messages import Channel
 
 _HEADS = struct.Struct("<BQHIQQIq")  # of a record, of the message in it, of the batch in that
 _MESSAGE_AT = scan.RECORD_HEAD.size
-_BATCH = struct.Struct("<Iq")
 _BATCH_AT = _MESSAGE_AT + scan.MESSAGE_HEAD.size
-_AROUND = scan.MESSAGE_HEAD.size + _BATCH.size
+_AROUND = scan.MESSAGE_HEAD.size + HEAD.size
 """Octets of a message's content that are no entries."""
-_ENTRY = 6
-"""Octets of an entry beside those that were read: when, and how many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,13 +75,13 @@ def run_of(chunk: bytes, channels: Mapping[int, Channel], topic: str, others: fr
         if opcode != scan.MESSAGE or length < _AROUND or end > end_of_chunk or channel in strange:
             return None
         if channel in wanted:
-            of_octets = at + _BATCH_AT + _BATCH.size + _ENTRY * count
+            of_octets = at + _BATCH_AT + HEAD.size + ENTRY * count
             if not count or of_octets > end or (following is not None and sequence != following):
                 return None
             if following is None:
                 first = sequence
             following, last = (sequence + count) & 0xFFFF_FFFF, last_time
-            begin = at + _BATCH_AT + _BATCH.size
+            begin = at + _BATCH_AT + HEAD.size
             starts.append(start)
             counts.append(count)
             bodies.append(end - of_octets)

@@ -1,18 +1,17 @@
-"""Reads in blocks to /raw messages: what `batch.Batcher` makes of them one by one, without an object a read."""
+"""Reads in blocks to /raw messages: what `batcher.Batcher` makes of them one by one, without an object a read."""
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from dissectors.frame import Chunk
-from sniff.recording.batch import LONGEST, MOST_CHUNKS, MOST_OCTETS, MOST_TIME, Batcher, Message
+from sniff.recording.batch import LONGEST, packed
+from sniff.recording.batcher import MOST_CHUNKS, MOST_OCTETS, MOST_TIME, Batcher
+from sniff.recording.topic_message import Message
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
-
-_HEAD = struct.Struct("<Iq")
 
 
 def add_block(batcher: Batcher, block: Block) -> Iterator[list[Message]]:
@@ -54,14 +53,9 @@ def _add_plain(batcher: Batcher, block: Block, begin: int, end: int) -> Iterator
         stop = min(stop, int(np.searchsorted(places, places[at] + MOST_OCTETS)))
         if stop >= len(times):
             break
-        data = b"".join(
-            (
-                _HEAD.pack(stop - at, start),
-                (times[at:stop] - start).astype("<u4").tobytes(),
-                lengths[at:stop].astype("<u2").tobytes(),
-                octets[int(places[at]) : int(places[stop])],
-            )
-        )
+        steps = (times[at:stop] - start).astype("<u4").tobytes()
+        sizes = lengths[at:stop].astype("<u2").tobytes()
+        data = packed(stop - at, start, steps, sizes, [octets[int(places[at]) : int(places[stop])]])
         yield batcher.closed(data, stop - at, start, int(times[stop - 1]))
         at = stop
     for place in range(at, len(times)):  # the last batch stays open

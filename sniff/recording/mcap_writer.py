@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 from sniff.engine.session import Item, LineEvent, Session
 from sniff.formats.files import NewFile, explain
-from sniff.recording.batch import Batcher, Message, stamp
+from sniff.recording.batcher import Batcher
 from sniff.recording.block_batches import add_block
 from sniff.recording.part import PartFile
+from sniff.recording.topic_message import Message, stamp
 from sniff.recording.topics import LINE, RAW
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from typing import BinaryIO
 
 from sniff.engine.session import Session
 from sniff.recording import frames
-from sniff.recording.batch import Message
 from sniff.recording.chunk_indices import ChunkIndices
+from sniff.recording.topic_message import Message
 from sniff.recording.topics import (
     BUS,
     FIXED_CHANNELS,

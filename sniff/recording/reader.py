@@ -25,10 +25,12 @@ from sniff.formats.files import explain, open_capture
 from sniff.formats.several_buses import SeveralBuses
 from sniff.formats.text import iso
 from sniff.recording import scan
-from sniff.recording.batch import Batch, Joiner, line_event
+from sniff.recording.batch import Batch
 from sniff.recording.batch_run import BatchRun, run_of
 from sniff.recording.clean_batches import CleanBatches
 from sniff.recording.frames import METADATA, SCHEMA, FrameBatch
+from sniff.recording.joiner import Joiner
+from sniff.recording.line_messages import line_event
 from sniff.recording.messages import Head, MessagePass
 from sniff.recording.topics import (
     BUS,

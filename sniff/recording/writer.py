@@ -27,8 +27,10 @@ from sniff.engine.session import (
     settings_change,
 )
 from sniff.recording import writer_thread
-from sniff.recording.batch import Batcher, Message, loss_message, stamp
+from sniff.recording.batcher import Batcher
+from sniff.recording.line_messages import loss_message
 from sniff.recording.rotation import Rotation
+from sniff.recording.topic_message import Message, stamp
 from sniff.recording.topics import LINE, RAW
 from sniff.recording.writer_thread import CHECK, CLOSE, SYNC, Changed, Flush, Keeper, WriteBatch
 

@@ -21,10 +21,10 @@ from typing import BinaryIO
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Session
 from sniff.formats.files import explain
-from sniff.recording.batch import Message
 from sniff.recording.part import PartFile
 from sniff.recording.rotation import FreeSpace, NewestParts, Rotation, part_name, parts
 from sniff.recording.sync_thread import Syncer
+from sniff.recording.topic_message import Message
 from sniff.recording.topics import LINE, RAW
 
 MOST_WAITING = 32 << 20

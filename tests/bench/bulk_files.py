@@ -23,8 +23,10 @@ from dissectors.columns import Reads
 from dissectors.line import LineSettings
 from sniff.engine.session import Session
 from sniff.formats.files import NewFile
-from sniff.recording.batch import MOST_CHUNKS, MOST_TIME, Message, stamp
+from sniff.recording.batch import packed
+from sniff.recording.batcher import MOST_CHUNKS, MOST_TIME
 from sniff.recording.part import PartFile
+from sniff.recording.topic_message import Message, stamp
 from sniff.recording.topics import RAW
 
 _S = 1_000_000_000
@@ -45,14 +47,10 @@ def write_mcap(path: Path, reads: Reads, session: Session) -> None:
         late = int(np.searchsorted(reads.times, reads.times[first] + MOST_TIME, "right"))
         end = min(first + MOST_CHUNKS, late)
         start, last = int(reads.times[first]), int(reads.times[end - 1])
-        data = b"".join(
-            (
-                struct.pack("<Iq", end - first, start),
-                (reads.times[first:end] - start).astype("<u4").tobytes(),
-                reads.lengths[first:end].astype("<u2").tobytes(),
-                reads.octets[begins[first] : begins[end]].tobytes(),
-            )
-        )
+        steps = (reads.times[first:end] - start).astype("<u4").tobytes()
+        sizes = reads.lengths[first:end].astype("<u2").tobytes()
+        octets = reads.octets[begins[first] : begins[end]].tobytes()
+        data = packed(end - first, start, steps, sizes, [octets])
         part.add(Message(RAW, stamp(last), stamp(start), first % (1 << 32), data))
         if part.waiting > 1 << 20:
             part.flush()

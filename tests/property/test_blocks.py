@@ -420,7 +420,7 @@ def test_a_clean_capture_is_never_read_item_by_item(
 
     for place in ("formats.pcap.items_of", "formats.pcapng.items_of", "formats.packet_columns.items_of"):
         monkeypatch.setattr(f"sniff.{place}", never)
-    monkeypatch.setattr("sniff.recording.batch.Joiner.raw", never)
+    monkeypatch.setattr("sniff.recording.joiner.Joiner.raw", never)
     assert told(unpacked(capture.blocks())) == expected
 
 

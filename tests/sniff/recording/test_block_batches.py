@@ -15,10 +15,12 @@ from sniff.engine.bulk import tables
 from sniff.engine.engine import Output, Row
 from sniff.engine.session import Item, LineEvent, LineEventKind
 from sniff.formats import read
-from sniff.recording.batch import LONGEST, MOST_TIME, Batcher, Message
+from sniff.recording.batch import LONGEST
+from sniff.recording.batcher import MOST_TIME, Batcher
 from sniff.recording.block_batches import add_block
 from sniff.recording.frame_columns import messages
 from sniff.recording.frames import EVENTS, TRANSACTIONS, FrameBatch
+from sniff.recording.topic_message import Message
 
 CAPTURES = sorted((Path(__file__).parents[3] / "captures").glob("*.cap.txt"))
 

@@ -18,9 +18,10 @@ from sniff.engine.capture import CaptureError
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session
 from sniff.formats import read
 from sniff.recording import scan
-from sniff.recording.batch import Batcher, Message
+from sniff.recording.batcher import Batcher
 from sniff.recording.part import PartFile
 from sniff.recording.reader import McapCapture
+from sniff.recording.topic_message import Message
 
 A_CHUNK = 6  # items a chunk of the small file
 BASE = 1_772_359_200_000_000_000
@@ -325,7 +326,7 @@ def test_the_check_of_a_chunk_is_what_mcap_says(start: bytes) -> None:
 
 def test_marks_for_entries_that_never_come(tmp_path: Path, start: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     """They are bounded in memory."""
-    monkeypatch.setattr("sniff.recording.batch._MOST_PENDING", 1000)
+    monkeypatch.setattr("sniff.recording.joiner._MOST_PENDING", 1000)
     line = b"".join(
         message_record(2, 0, b'{"kind":"parity","offset":0,"chunk":%d}' % (10**12 + n)) for n in range(1200)
     )

@@ -144,7 +144,9 @@ def test_times_beyond_what_mcap_holds(tmp_path: Path) -> None:
 
 
 def test_more_than_two_to_the_32_chunks() -> None:
-    from sniff.recording.batch import Batch, Batcher, Joiner
+    from sniff.recording.batch import Batch
+    from sniff.recording.batcher import Batcher
+    from sniff.recording.joiner import Joiner
 
     batcher = Batcher(2**32 - 2)
     joiner = Joiner(2**32 - 2)
