@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -12,6 +12,7 @@ from dissectors.frame import Flaw
 from dissectors.late_speakers import LateSpeakers
 from dissectors.line import MS, Timing
 from dissectors.modbus.station_record import Cycles, StationRecord
+from dissectors.rhythm import Rhythm
 from dissectors.strikes import Strikes
 
 _SENDERS_KEPT = 300
@@ -24,10 +25,6 @@ _AGAIN_SOON = 150 * MS  # hardly a master repeats sooner
 _UNHEARD_LEAST = 3
 _CLOSE_KEPT = 4096
 _LATE_KEPT = 4096
-_TURNS_LEAST = 16
-
-TURNS_KEPT = 64
-"""Turns of the master, of which the newest are compared."""
 
 PAUSE_MARGIN = 5
 """So many times the adapter's delay must fit into 1.5 characters before pauses inside frames are judged."""
@@ -63,8 +60,6 @@ class Again:
 class BusRecord:
     """What was seen on the bus. Times are ns.
 
-    `turns`: of the newest answered requests, from their begin to that of the next request and to the answer's end.
-
     `hasty`: requests after another that nothing had followed: (longest reading of the silence between, unit asked
     before, time, frame before, frame). `broken_in`: the same of
     damaged frames that begin as a request to another station. `close`, `paused`, `bare_ends`: by sender; of the first,
@@ -85,7 +80,7 @@ class BusRecord:
     timing: Timing
     first: int | None = None
     now: int = 0
-    turns: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=TURNS_KEPT))
+    rhythm: Rhythm = field(default_factory=Rhythm)
     requests: int = 0
     answers: int = 0
     echoes: int = 0
@@ -157,23 +152,14 @@ class BusRecord:
         others = [one for unit, one in self.stations.items() if unit not in cut and one.times.count]
         return sorted(cut) if len(cut) >= _CUT_LEAST and all(_usual(one) > latest for one in others) else []
 
-    @property
-    def is_by_the_clock(self) -> bool:
-        """Whether the master sends by the clock: from one request to the next takes as long however long the answer
-        takes. What it does then says nothing of an answer."""
-        if len(self.turns) < _TURNS_LEAST:
-            return False
-        cycles, answers = sorted(cycle for cycle, _ in self.turns), sorted(answer for _, answer in self.turns)
-        low, high = len(answers) // 10, 9 * len(answers) // 10
-        differ = answers[high] - answers[low]
-        return differ >= 2 * MS and 4 * (cycles[high] - cycles[low]) <= differ
-
     def unheard(self) -> list[int]:
         """Stations whose answers this tap missed, by what the master did: all, where none is heard of any."""
         asked = {unit: one for unit, one in self.stations.items() if one.missing.count >= _UNHEARD_LEAST}
         if len(asked) > 1 and not any(one.repeats.count for one in asked.values()) and self.hears_nobody:
             return sorted(asked)
-        return [] if self.is_by_the_clock else sorted(unit for unit, one in self.stations.items() if one.is_unheard)
+        if self.rhythm.is_by_the_clock:
+            return []
+        return sorted(unit for unit, one in self.stations.items() if one.is_unheard)
 
     @property
     def hears_nobody(self) -> bool:

@@ -97,7 +97,7 @@ def hurried(gaps: Gaps, pauses: list[int]) -> list[int]:
 
 
 def turns_before(gaps: Gaps, rows: RowColumns, requests: list[int], first: int) -> tuple[Times, Times]:
-    """`BusRecord.turns` up to each of some requests behind answers, in a stretch that begins with row `first`; 0 where
+    """`Rhythm.turns` up to each of some requests behind answers, in a stretch that begins with row `first`; 0 where
     that is not known."""
     start, end, at = rows.frames.start, rows.frames.end, np.array(requests, np.int64)
     inside = at > first

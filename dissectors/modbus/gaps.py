@@ -153,9 +153,9 @@ class Gaps:
         return len(before) >= SPACING_LEAST and 2 * pause < middle(before) - self.latency
 
     def paused(self, pauses: Sequence[int], turns: Iterable[tuple[int, int]]) -> None:
-        """The master's next pauses between an answer and a request, ns; `turns`: see `BusRecord.turns`."""
+        """The master's next pauses between an answer and a request, ns; `turns`: see `Rhythm.turns`."""
         self.pauses.extend(pauses)
-        self.seen.turns.extend(turns)
+        self.seen.rhythm.turns.extend(turns)
         for pause in pauses[-PAUSES_KEPT:]:
             self._learnt.paused(pause, 0)
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from dissectors.frame import Frame
 from dissectors.modbus.asked import AskedRequest
-from dissectors.modbus.bus_record import TURNS_KEPT
 from dissectors.modbus.exchange_columns import SAMPLES
 from dissectors.modbus.learned_timing import READ
 from dissectors.modbus.long_silences import SILENCE_LEAST
@@ -18,6 +17,7 @@ from dissectors.modbus.regular_exchanges import REFUSED, TO_ALL, UNANSWERED
 from dissectors.modbus.remembered import BEGIN, LAST_STANDARD_UNIT, OPEN_KEPT, SLOW_UNLEARNT, slow_limit
 from dissectors.modbus.response_groups import AnsweredRequest, SameRequest
 from dissectors.modbus.station_record import Key, Requested, StationRecord
+from dissectors.rhythm import TURNS_KEPT
 from dissectors.tracker import Interval, Transaction
 
 if TYPE_CHECKING:

@@ -212,7 +212,7 @@ class N2Findings:
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far: the bus first, then station by station."""
         span = self.now - (self.first or 0)
-        masters, clocked = self.masters.seen, self.clocked.is_sure
+        masters, clocked = self.masters.seen, self.clocked.rhythm.is_by_the_clock
         heard = N2Evidence(self.now, span, self.master, self.stations, masters, self._stray, self.strikes, clocked)
         found = (reaching(one, self.late_speakers) if one.code == "N2011" else one for one in worded(heard))
         return (*found, *of_late_speakers(heard, self.late_speakers))

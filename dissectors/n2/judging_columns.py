@@ -18,13 +18,13 @@ import numpy as np
 from dissectors import stretches
 from dissectors.columns import NONE, ROLES, VERDICTS
 from dissectors.frame import Frame, Role
-from dissectors.n2.clocked import MOST
 from dissectors.n2.commands import parse_command
 from dissectors.n2.findings import ANSWERS_KEPT, N2Findings, refusal_code
 from dissectors.n2.header import BROADCAST, meant
 from dissectors.n2.masters import HASTE, OpenCommand
 from dissectors.n2.unheard import ONLY_LOOKS, SOON
 from dissectors.n2.wording import SLOW
+from dissectors.rhythm import TURNS_KEPT
 from dissectors.row_columns import in_turn
 from dissectors.tracker import Verdict
 
@@ -146,15 +146,14 @@ class _Judging:
         judge.turn = int(self.found.unit[end - 1])
 
     def _see_rhythm(self, begin: int, end: int) -> None:
-        """How steady the master's steps and pauses are."""
+        """The master's newest turns, which tell whether it has a clock."""
         clocked, found, frames = self._judge.clocked, self.found, self._rows.frames
         request, last = found.stretches.request[begin:end], found.stretches.last[begin:end]
         clocked.see_command(int(frames.start[request[0]]))
         begins, ends, answered = frames.start[request], frames.end[request], found.answered[begin:end]
-        if room := MOST - clocked.steps.count:
-            soon = np.flatnonzero(answered[:-1] & (begins[1:] - ends[:-1] < SOON))[:room]
-            clocked.steps.add_many((begins[1:] - begins[:-1])[soon])
-            clocked.pauses.add_many((begins[1:] - frames.end[last[:-1]])[soon])
+        soon = np.flatnonzero(answered[:-1] & (begins[1:] - ends[:-1] < SOON))[-TURNS_KEPT:]
+        cycles, answers = begins[soon + 1] - begins[soon], frames.end[last[soon]] - begins[soon]
+        clocked.rhythm.turns.extend(zip(cycles.tolist(), answers.tolist(), strict=True))
         if answered[-1]:
             clocked.answered(int(begins[-1]), int(ends[-1]), int(frames.end[last[-1]]))
 

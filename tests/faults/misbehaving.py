@@ -151,6 +151,21 @@ class ByTheClock(PollingMaster):
         super()._go_on(max(at, self.began + self.tick))
 
 
+class OnTheTick(Wrapped):
+    """A master that sends at multiples of `tick` ns, and at no other time."""
+
+    def __init__(self, inner: Station, tick: int) -> None:
+        super().__init__(inner)
+        self.tick = tick
+
+    def wake(self, now: int) -> tuple[Send, ...]:
+        return () if now % self.tick else self.inner.wake(now)
+
+    def next_wake(self) -> int | None:
+        due = self.inner.next_wake()
+        return None if due is None else -(-due // self.tick) * self.tick
+
+
 class ScansOnce(PollingMaster):
     """Asks in turn; from `at` on it looks once for whom else there is, each of `scan` in one round, then goes on."""
 

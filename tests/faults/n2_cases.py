@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -10,15 +11,15 @@ from dissectors.frame import Place
 from dissectors.modbus.simulated_master import read_holding
 from dissectors.n2.simulated import reading
 from dissectors.simulated import Station
-from dissectors.simulated_faults import BitFlips, LateResponse, NoiseInGaps
+from dissectors.simulated_faults import BitFlips, LateResponse, LostResponse, NoiseInGaps
 from sniff.simulation.tap import FTDI
 from tests.faults.case import Case, Said
-from tests.faults.misbehaving import Trimmed, When
+from tests.faults.misbehaving import OnTheTick, Trimmed, When
 from tests.faults.ring_programs import controller, drive, fault_input
-from tests.faults.stations import Of, Shows
+from tests.faults.stations import Dies, Of, Shows
 from tests.faults.workbench import N2, Member, Modbus, Ring, by_turns, follower
 
-MS = 1_000_000
+MS, S = 1_000_000, 1_000_000_000
 
 _turns = partial(by_turns, 1, 2)
 _followers = {"drive 1": partial(follower, 1, 10 * MS), "drive 2": partial(follower, 2, 18 * MS)}
@@ -68,7 +69,26 @@ def _bit_reader() -> Application:
     return Poller([(mac, "binary-input,2", "present-value") for mac in (5, 9)])
 
 
+_by_the_clock = N2(
+    _turns, _few, change_master=partial(OnTheTick, tick=180 * MS), pause=20 * MS, timeout=120 * MS, retries=0
+)
+
 N2_CASES: tuple[Case, ...] = (
+    # a master that goes on as after an answer, since it never waits for one
+    Case(
+        "N2 station dies, master by the clock",
+        replace(_by_the_clock, followers={**_few, "drive 2": lambda: Dies(follower(2, 60 * MS, few=True), at=30 * S)}),
+        (("N2005", "station 2"),),
+        never=("N2015",),
+        seeds=1,
+    ),
+    Case(
+        "N2 answers lost, master by the clock",
+        replace(_by_the_clock, faults=(LostResponse(0.08, ("drive 2",)),)),
+        (("N2005", "station 2"),),
+        never=("N2015",),
+        seeds=2,
+    ),
     Case(
         "N2 late answers into the next turn",
         N2(
