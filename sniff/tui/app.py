@@ -18,24 +18,23 @@ from textual.timer import Timer
 from dissectors.findings import Finding
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.feed import Feed, FeedStatus
-from sniff.bus.foreign_rows import ForeignRows
 from sniff.bus.rows import Store
-from sniff.config import ConfigError, nearest
+from sniff.config import ConfigError
 from sniff.config import load as load_config
 from sniff.filter import FilterError
 from sniff.tui.analyzer import Analyzer
 from sniff.tui.busbar import BusBar
+from sniff.tui.buses import Buses
 from sniff.tui.guest import is_guest
-from sniff.tui.header import StatusHeader, why_ended
+from sniff.tui.header import StatusHeader
 from sniff.tui.health_meter import HealthMeter
 from sniff.tui.help import HelpScreen
-from sniff.tui.key_names import KNOWN, named
+from sniff.tui.key_names import complaints, keymap, named
 from sniff.tui.palette import ActionCommands
 from sniff.tui.prompt import Prompt
 from sniff.tui.screens import SCREENS, STYLED, Entry, load
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.seats import BusLine, Seat
-from sniff.tui.site_meter import SiteMeter
 from sniff.tui.themes import DARK, DARK_SIXTEEN, DIM, LIGHT, LIGHT_SIXTEEN, THEMES
 from sniff.tui.view_state import Viewing
 
@@ -48,8 +47,6 @@ CALM_SECONDS = 0.2
 """How long what is not on the screen waits after a key: who holds one down must not feel it."""
 SURE_SECONDS = 4.0
 """How long a first `q` during a recording waits for the second."""
-PATH = 8
-"""Screens that `q` can walk back over."""
 
 
 class SnifferApp(Analyzer):
@@ -87,12 +84,9 @@ class SnifferApp(Analyzer):
         super().__init__()
         self._take_themes()
         feeds = feed if isinstance(feed, Sequence) else [feed]
-        self.seats = [Seat.of(each, start_screen) for each in feeds]
-        self.here = 0  # which of them is shown
-        self._site = SiteMeter()
-        self._polled = 0  # which file was polled last of those that are not shown
+        self._followed = Buses(feeds, start_screen)
         for entry in SCREENS:
-            for number in range(len(self.seats)):
+            for number in range(len(feeds)):
                 self.add_mode(_mode(entry.name, number), partial(self._make, entry))
         self.tabs = tuple((entry.key, entry.title) for entry in SCREENS)
         self._worker: Timer | None = None
@@ -121,7 +115,7 @@ class SnifferApp(Analyzer):
     @property
     def seat(self) -> Seat:
         """The bus that is shown."""
-        return self.seats[self.here]
+        return self._followed.shown
 
     @property
     def feed(self) -> Feed:
@@ -156,34 +150,32 @@ class SnifferApp(Analyzer):
     @property
     def buses(self) -> Sequence[BusLine]:
         """What the bar says of each; none where there is only one."""
-        if len(self.seats) < 2:
-            return ()
-        return [seat.line(number == self.here) for number, seat in enumerate(self.seats)]
+        return self._followed.lines
 
     def site_is_due(self) -> bool:
         """Whether the buses together would say more than they did."""
-        return not self.viewing.frozen and self._site.is_due(self.seats)
+        return self._followed.site_is_due()
 
     def findings(self) -> tuple[Finding, ...]:
         """Of the bus that is shown; where there are several, with what they say together."""
-        return self._site.findings(self.seats, self.here, self.viewing.findings(), anew=not self.viewing.frozen)
+        return self._followed.findings()
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """There is no other bus to show where there is only one."""
-        return len(self.seats) > 1 if action == "bus" else super().check_action(action, parameters)
+        return self._followed.are_several if action == "bus" else super().check_action(action, parameters)
 
     def action_bus(self, step: int) -> None:
         """Show another bus, on the screen that was shown of it last."""
-        self._go_to((self.here + step) % len(self.seats))
+        self._go_to(self._followed.after(step))
 
     def show_bus(self, name: str) -> None:
         """Show the bus of this name."""
-        self._go_to(next((number for number, seat in enumerate(self.seats) if seat.name == name), self.here))
+        self._go_to(self._followed.named(name))
 
     def _go_to(self, number: int) -> None:
-        if number == self.here:
+        if number == self._followed.here:
             return
-        self.here = number
+        self._followed.here = number
         self.switch_mode(_mode(self.visited[-1], number))
 
     async def on_event(self, event: Event) -> None:
@@ -198,7 +190,7 @@ class SnifferApp(Analyzer):
         """Start to poll."""
         try:
             colours = load_config().colours
-            for seat in self.seats:
+            for seat in self._followed.seats:
                 seat.viewing.colour_rules(colours)
         except (ConfigError, FilterError) as error:
             self.notify(sanitized(error), severity="error", markup=False)
@@ -227,78 +219,23 @@ class SnifferApp(Analyzer):
             return
         for entry in SCREENS:
             load(entry)  # names of keys are known with their screens
-        known = tuple(sorted(KNOWN))
-        for name in keys:
-            if name not in known:
-                said = sanitized(f"[keys] unknown name {name!r}{nearest(name, known)}")
-                self.notify(said, severity="error", markup=False)
-        self.set_keymap({name: key for name, key in keys.items() if name in known and key})
+        for said in complaints(keys):
+            self.notify(sanitized(said), severity="error", markup=False)
+        self.set_keymap(keymap(keys))
 
     def poll(self) -> None:
         """Take what the feed has and show it."""
         if not self.screen_stack:  # the app is ending
             return
-        changed = self._poll(self.seat)
-        self._poll_others()
-        if self._worker is not None and any(seat.is_still_read for seat in self.seats):
+        changed, notices = self._followed.poll()
+        for notice in notices:
+            self.notify(notice.text, title=notice.title, severity=notice.severity, markup=False)
+        if self._worker is not None and self._followed.are_still_read:
             self._worker.resume()
         if changed:
             self.viewing.take_marks()
             self.draw_screen()
         self._draw_header()
-
-    def _poll(self, seat: Seat) -> bool:
-        """Take what has come of a bus; whether anything has."""
-        changed = seat.feed.poll()
-        before, seat.status = seat.status, seat.feed.status()
-        if before.searching and not seat.status.searching:
-            self._take_what_was_found(seat)
-        if before.reading and not seat.status.reading:  # there is nothing to follow any more
-            seat.viewing.follow = False
-        if seat.status.second and seat.viewing.foreign is None:
-            seat.viewing.foreign = ForeignRows(seat.feed.store, seat.status.second, seat.status.since)
-            changed = True
-        self._tell(seat)
-        return changed
-
-    def _poll_others(self) -> None:
-        """The buses that are not shown: those of a capture all, of files one at a time, so that keys are answered."""
-        others = [seat for number, seat in enumerate(self.seats) if number != self.here]
-        files = [seat for seat in others if not seat.status.live]
-        self._polled += 1
-        for seat in [one for one in others if one.status.live] + files[self._polled % max(1, len(files)) :][:1]:
-            self._poll(seat)
-
-    def _tell(self, seat: Seat) -> None:
-        """Say once what happened to the recording, to the view and to the capture."""
-        bus = f"{sanitized(seat.name)}: " if len(self.seats) > 1 else ""
-        status, store = seat.status, seat.feed.store
-        trouble = status.trouble
-        if trouble != seat.told_trouble:
-            seat.told_trouble = trouble
-            said = bus + (sanitized(trouble) or "it goes on")
-            self.notify(said, title="recording", severity="error" if trouble else "information", markup=False)
-        if store.dropped_rows and not seat.told_dropped:
-            seat.told_dropped = True
-            file = "the file keeps all" if status.in_file else "nothing is recorded"
-            said = f"{bus}the oldest rows leave the view, {store.keep} stay; {file}"
-            self.notify(said, title="memory", markup=False)
-        if status.ended and not seat.told_end:
-            seat.told_end = True
-            said = bus + sanitized(why_ended(status, store)[1])
-            self.notify(said, title="the capture has ended", severity="warning", markup=False)
-
-    def _take_what_was_found(self, seat: Seat) -> None:
-        """A search for settings has ended: say so, and read the filter with what was found."""
-        if seat.status.ended:
-            return
-        bus = f"{seat.name}: " if len(self.seats) > 1 else ""
-        said = sanitized(f"{bus}found: {seat.status.protocol}, {seat.status.line}")
-        self.notify(said, title="the search has ended", markup=False)
-        try:
-            seat.viewing.set_filter(seat.viewing.filter)
-        except FilterError:  # it names fields of another protocol
-            seat.viewing.set_filter("")
 
     def draw_screen(self) -> None:
         """Bring the shown screen up to date."""
@@ -317,15 +254,10 @@ class SnifferApp(Analyzer):
 
     def _work(self) -> None:
         screen = self.shown
-        busy = time.monotonic() - self._pressed < CALM_SECONDS or self._work_of_feeds()
+        busy = time.monotonic() - self._pressed < CALM_SECONDS or self._followed.work()
         busy |= screen is not None and _is_whole(screen) and screen.work_left() and screen.work()
         if not busy and self._worker is not None:
             self._worker.pause()
-
-    def _work_of_feeds(self) -> bool:
-        """Do a piece of what can wait, first for the bus that is shown; whether more is left."""
-        others = (seat for number, seat in enumerate(self.seats) if number != self.here)
-        return any(seat.feed.work() for seat in (self.seat, *others))
 
     def _draw_header(self) -> None:
         status = self.status
@@ -342,14 +274,14 @@ class SnifferApp(Analyzer):
         """Show a screen; `q` comes back from it."""
         if name == self.visited[-1]:
             return
-        self.seat.visited = with_step(self.visited, name)
-        self.switch_mode(_mode(name, self.here))
+        self.seat.visit(name)
+        self.switch_mode(_mode(name, self._followed.here))
 
     def action_go_back(self) -> None:
         """Go to the screen before; quit at the first one, asking again while a recording runs."""
         if len(self.visited) > 1:
             self.visited.pop()
-            self.switch_mode(_mode(self.visited[-1], self.here))
+            self.switch_mode(_mode(self.visited[-1], self._followed.here))
             return
         if self.status.live and self.status.recording and time.monotonic() - self._asked_to_quit > SURE_SECONDS:
             self._asked_to_quit = time.monotonic()
@@ -431,14 +363,6 @@ class SnifferApp(Analyzer):
         """Filters work on every screen."""
         if message.purpose == "filter":
             self.filter(message.text)
-
-
-def with_step(path: list[str], name: str) -> list[str]:
-    """The path of screens with one more; to and fro between two (A B A B) is kept once, and the oldest give way."""
-    longer = [*path, name]
-    if len(longer) >= 4 and longer[-2:] == longer[-4:-2]:
-        longer = longer[:-2]
-    return longer[-PATH:]
 
 
 def _mode(name: str, bus: int) -> str:

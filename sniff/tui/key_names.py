@@ -7,10 +7,12 @@ one that shows a screen "switch-frames".
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from textual.binding import Binding, BindingType
+
+from sniff.config import nearest
 
 _ACTION = re.compile(r"(?:\w+\.)?(\w+)(?:\((.*)\))?")
 KNOWN: set[str] = set()
@@ -40,3 +42,14 @@ def named(bindings: Iterable[BindingType]) -> list[BindingType]:
             KNOWN.add(one.id)
         made.append(one)
     return made
+
+
+def keymap(wanted: Mapping[str, str]) -> dict[str, str]:
+    """The keys that a configuration gives to names that there are."""
+    return {name: key for name, key in wanted.items() if name in KNOWN and key}
+
+
+def complaints(wanted: Mapping[str, str]) -> Iterator[str]:
+    """What is to be said of names that there are not."""
+    known = tuple(sorted(KNOWN))
+    return (f"[keys] unknown name {name!r}{nearest(name, known)}" for name in wanted if name not in known)

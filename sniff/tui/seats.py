@@ -10,6 +10,9 @@ from sniff.engine.session import LineEventKind
 from sniff.tui.health_meter import HealthMeter
 from sniff.tui.view_state import Viewing
 
+PATH = 8
+"""Screens that `q` can walk back over."""
+
 
 class BusState(Enum):
     """How a bus is, where that is worth a word; the value is what people read."""
@@ -59,6 +62,10 @@ class Seat:
         """What the bus is called."""
         return self.feed.store.session.bus
 
+    def visit(self, screen: str) -> None:
+        """Show another screen; `q` comes back from it."""
+        self.visited = with_step(self.visited, screen)
+
     @property
     def is_still_read(self) -> bool:
         """Whether a file is not read and judged to its end."""
@@ -84,6 +91,14 @@ class Seat:
         health = None if self.health.bus is None else self.health.bus.score
         load = store.load.share() if self.status.live else store.load.overall()
         return BusLine(self.name, self.state, health, load, store.error_total, self.status.dropped, is_here)
+
+
+def with_step(path: list[str], name: str) -> list[str]:
+    """The path of screens with one more; to and fro between two (A B A B) is kept once, and the oldest give way."""
+    longer = [*path, name]
+    if len(longer) >= 4 and longer[-2:] == longer[-4:-2]:
+        longer = longer[:-2]
+    return longer[-PATH:]
 
 
 _OF_PORT = (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED)

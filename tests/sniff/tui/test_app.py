@@ -12,13 +12,13 @@ from textual.widgets import Static
 
 from sniff.bus.feed import FeedStatus, StoreFeed
 from sniff.tui import run
-from sniff.tui.app import PATH, with_step
 from sniff.tui.header import SHORT_TITLES, SHORTEST
 from sniff.tui.help import HelpScreen
 from sniff.tui.keybar import explanation, working_keys
 from sniff.tui.palette import ActionCommands
 from sniff.tui.screens import SCREENS, load
 from sniff.tui.screens.base import ViewScreen
+from sniff.tui.seats import PATH, with_step
 
 
 def test_every_screen_of_the_table_is_there(look: Any, busy_bus: Any) -> None:

@@ -152,7 +152,7 @@ def test_of_one_bus_there_is_no_bar(feeds: list[StoreFeed]) -> None:
         assert "boiler" not in see.lines()[2]
         assert "b bus" not in see.text()
         await see.press("b")
-        assert see.app.here == 0
+        assert see.app.seat.name == "boiler"
 
     look(feeds[:1], script)
 
