@@ -51,13 +51,13 @@ def run(args: argparse.Namespace) -> int:
 
         print(shipped.unit() if args.what == "unit" else shipped.rules(), end="")
         return 0
-    from sniff.cli import box_running
+    from sniff.cli import box_plan, box_running
 
     if not any(bus.port for bus in targets.configured().buses.values()):
         raise Failure(f"no bus with a port is configured; name some in {FILE} ([bus.NAME], port = …)", USAGE)
     args.ports, args.all = [], True
     wanted = targets.targets_of(args)
-    return box_running.run(box_running.plan(args), wanted)
+    return box_running.run(box_plan.plan(args), wanted)
 
 
 def _status(args: argparse.Namespace) -> int:

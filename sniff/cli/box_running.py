@@ -2,41 +2,35 @@
 
 from __future__ import annotations
 
-import argparse
 import os
-import shutil
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
-from dissectors.findings import Finding, Severity
+from dissectors.findings import Finding
 from sniff.analysis.sanitizing import sanitized
-from sniff.analysis.site_findings import SiteJudgement, judged
-from sniff.analysis.site_rules import SITE
 from sniff.box import notify, words
 from sniff.box.notify import Notifier
-from sniff.box.page import HAS_UNIX, SUFFIX, RunsAlready, StatusPage, runtime_folders
+from sniff.box.page import RunsAlready, StatusPage
 from sniff.box.past import CapturePid, Closing, cut_parts, remove_half_written
 from sniff.box.progress import Progress
-from sniff.box.status import BoxStatus, BusStatus, FindingLine, Recovered
+from sniff.box.status import BoxStatus, BusStatus, Recovered
 from sniff.box.watch import BusWatch
 from sniff.bus.live import LiveBus
-from sniff.bus.site import site_bus
 from sniff.capture.config import RecordSpec
 from sniff.capture.ipc import Status
-from sniff.cli import UNREADABLE, USAGE, Failure, arguments, listening, outlets, printing, targets, telling
+from sniff.cli import UNREADABLE, USAGE, Failure, box_status, listening, outlets, printing, telling
+from sniff.cli.box_plan import Plan
+from sniff.cli.box_site import BoxSite
 from sniff.cli.interruption import until_interrupted
 from sniff.cli.targets import Target
 from sniff.engine.session import LineEvent
 from sniff.outlet_settings import OutletSettings
-from sniff.outlets.news import NewsDesk
-from sniff.recording.rotation import FreeSpace, parts
+from sniff.recording.rotation import FreeSpace, free_octets
 from sniff.sources.clock import Clock
 from sniff.version import __version__
-
-ROTATE, KEEP_FREE, NAME = "size:64MB,time:1d", "1GB", "site"
 
 PAGE_EVERY = 1.0
 """Seconds between looks at how all stands."""
@@ -46,64 +40,6 @@ BACKOFF = (0.5, 1, 2, 5, 10, 30)
 
 LASTED = 60.0
 """A capture that ran for so many seconds did not fail at once."""
-
-JUDGED_EVERY = 10.0
-"""Seconds between looks at what the buses say together."""
-
-MOST_FINDINGS = 20
-"""Findings of a bus on the status page; more are counted."""
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """What a box is told. `path`: of the recording, before the numbers of its parts. `socket`: None for none."""
-
-    path: Path
-    rotate: str
-    keep: int | None
-    keep_free: int
-    socket: Path | None
-    status_port: int | None
-    outlets: OutletSettings | None = None
-
-    @property
-    def name(self) -> str:
-        """What the box is called."""
-        return self.path.stem
-
-
-def plan(args: argparse.Namespace) -> Plan:
-    """Flags, and behind them the configuration. Ends with exit code 2 for what cannot be meant."""
-    told = targets.configured().box
-    try:
-        rotate = args.rotate or arguments.rotation(told.rotate or ROTATE)
-        keep_free = args.keep_free if args.keep_free is not None else arguments.octets(told.keep_free or KEEP_FREE)
-    except argparse.ArgumentTypeError as error:
-        raise Failure(f"[box] {error}", USAGE) from None
-    folder = Path(args.folder or told.folder or os.environ.get("STATE_DIRECTORY", "").partition(":")[0] or ".")
-    name = args.name or told.name or NAME
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise Failure(f"{folder}: {error.strerror}; name another --folder", UNREADABLE) from None
-    socket = Path(args.socket) if args.socket else _socket(name)
-    port = args.status_port if args.status_port is not None else told.status
-    if args.metrics is None and told.metrics is not None and targets.configured().outlets.metrics is None:
-        args.metrics = str(told.metrics)
-    wanted = outlets.settings_of(args)
-    return Plan(folder / f"{name}.mcap", rotate, args.keep or told.keep, keep_free, socket, port, wanted)
-
-
-def _socket(name: str) -> Path | None:
-    """Where the status page listens: in the first runtime directory that can be written to."""
-    for folder in runtime_folders() if HAS_UNIX else ():
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        if os.access(folder, os.W_OK):
-            return folder / f"{name}{SUFFIX}"
-    return None
 
 
 def run(told: Plan, wanted: Sequence[Target]) -> int:
@@ -147,9 +83,7 @@ class Box:
         self._ready = self._stopping = False  # whether it was told, and is to be
         self._next_page = 0.0
         self._next_word = 0.0
-        self._judged: SiteJudgement | None = None
-        self._judge_at = 0.0
-        self._desk: NewsDesk | None = None
+        self._site = BoxSite(str(told.path))
         self._telling = outlets.prepare(told.outlets or OutletSettings())
         self._closing: Closing | None = None
 
@@ -217,7 +151,7 @@ class Box:
         link = lives[0].link
         self._pid.remember(link.pid)
         self._begun = link.clock.now()
-        self._judged = None
+        self._site.begin()
         self._progress = Progress(time.monotonic_ns())
         for watch in self._watches:
             watch.begin(self._begun)
@@ -309,7 +243,7 @@ class Box:
             return
         self._next_page = now + PAGE_EVERY
         status = self.status()
-        self._page.json, self._page.words = _json(status), words.text(status)
+        self._page.json, self._page.words = box_status.page_json(status), words.text(status)
         if self._begun is not None and self._progress.trouble(time.monotonic_ns()) is None:
             self._ready = self._ready or self._notifier.tell(notify.READY)
             self._notifier.tell(notify.WATCHDOG)
@@ -327,10 +261,10 @@ class Box:
         drift = clock.drift()
         now = clock.now()
         path = self._told.path
-        there = parts(path)
+        count, size = box_status.parts_and_size(path)
         stuck = self._progress.trouble(time.monotonic_ns()) if running else None
         newest = live.status if live is not None else None
-        site = self._site(now) if running else None
+        site = self._site.look(self._printers, time.monotonic(), now) if running else None
         told = [printer.alerts[0] for printer in self._printers[:1] if printer.alerts is not None]
         return BoxStatus(
             name=self._told.name,
@@ -347,9 +281,9 @@ class Box:
             last_restart=self._last_restart,
             folder=str(path.parent.resolve()),
             current=os.path.basename(newest.path) if newest is not None and running else "",
-            parts=len(there),
-            parts_size=sum(_size(part) for _, part in there),
-            free=_free(path.parent),
+            parts=count,
+            parts_size=size,
+            free=free_octets(path.parent),
             keep_free=self._told.keep_free,
             behind=newest.behind if newest is not None and running else 0.0,
             clock_offset=drift if running else 0,
@@ -357,91 +291,16 @@ class Box:
             alerts_dropped=sum(one.dropped for one in told),
             recovered=tuple(self._recovered),
             outlets=() if self._telling is None else self._telling.lines(),
-            site=tuple(_line(one, drift) for one in site.findings) if site is not None else (),
+            site=tuple(box_status.finding_line(one, drift) for one in site.findings) if site is not None else (),
             buses=tuple(
                 self._bus(number, now, drift, None if site is None else site.buses[number])
                 for number in range(len(self._watches))
             ),
         )
 
-    def _site(self, now: int) -> SiteJudgement | None:
-        """What the buses say together; looked at now and then, and told to whoever is to be."""
-        if len(self._printers) < 2:
-            return None
-        if self._judged is None or time.monotonic() >= self._judge_at:
-            self._judge_at = time.monotonic() + JUDGED_EVERY
-            self._judged = judged(
-                [site_bus(live.model, live.ear, live.findings()) for live in (one.live for one in self._printers)]
-            )
-            alerts = self._printers[0].alerts
-            if alerts is not None:
-                self._desk = self._desk or alerts[1].another()
-                for news in self._desk.look(self._judged.findings, now):
-                    alerts[0].tell(SITE, str(self._told.path), news)
-        return self._judged
-
     def _bus(self, number: int, now: int, drift: int, findings: tuple[Finding, ...] | None) -> BusStatus:
-        watch, source = self._watches[number], self._targets[number].source
-        state, since, why = watch.state(now)
-        status = BusStatus(
-            source.bus,
-            source.spec,
-            str(source.line),
-            source.protocol,
-            state,
-            since + drift,
-            why,
-            None if watch.heard_at is None else watch.heard_at + drift,
-            watch.octets,
-            watch.lost,
-            watch.unseen,
-            watch.downs,
-            watch.time_away(now),
-        )
+        status = box_status.bus_status(self._watches[number], self._targets[number].source, now, drift)
         if not self._printers:
             return status
         live = self._printers[number].live
-        return _judged(status, live, live.findings() if findings is None else findings, drift)
-
-
-def _line(one: Finding, drift: int) -> FindingLine:
-    last = one.last + drift if one.last > 0 else None
-    return FindingLine(one.code, one.severity.label, one.subject, one.seen, last)
-
-
-def _judged(status: BusStatus, live: LiveBus, found: tuple[Finding, ...], drift: int) -> BusStatus:
-    """With what was counted and found since the capture began."""
-    summary = live.model.summary
-    findings = [one for one in found if one.cause is None and one.severity >= Severity.NOTE]
-    return replace(
-        status,
-        line=live.session.line_words,
-        protocol=live.session.protocol_words,
-        frames=summary.frames,
-        damaged=summary.damaged,
-        load=summary.load.share(),
-        health=live.model.health().bus.score if summary.frames else None,
-        searching=live.searching is not None,
-        findings=tuple(_line(one, drift) for one in findings[:MOST_FINDINGS]),
-        more_findings=max(0, len(findings) - MOST_FINDINGS),
-    )
-
-
-def _json(status: BoxStatus) -> str:
-    from sniff.cli import json_output
-
-    return json_output.dumps(status.to_json())
-
-
-def _size(path: Path) -> int:
-    try:
-        return path.stat().st_size
-    except OSError:
-        return 0
-
-
-def _free(folder: Path) -> int | None:
-    try:
-        return shutil.disk_usage(folder).free
-    except OSError:
-        return None
+        return box_status.judged_status(status, live, live.findings() if findings is None else findings, drift)

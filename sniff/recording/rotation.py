@@ -131,7 +131,8 @@ class FreeSpace:
         """Remove what must go; what was removed. Never raises."""
         gone = []
         for _, part in parts(self._path):
-            if part.name == current.name or _free(self._path.parent) >= self._least:
+            free = free_octets(self._path.parent)
+            if part.name == current.name or free is None or free >= self._least:
                 break
             with contextlib.suppress(OSError):
                 part.unlink()
@@ -139,12 +140,12 @@ class FreeSpace:
         return gone
 
 
-def _free(folder: Path) -> int:
-    """Octets that are free on the disk of a folder; as many as anybody wants where nobody knows."""
+def free_octets(folder: Path) -> int | None:
+    """Octets that are free on the disk of a folder; None where nobody knows."""
     try:
         return shutil.disk_usage(folder).free
     except OSError:
-        return 1 << 62
+        return None
 
 
 def _removed(path: Path, begun: os.stat_result | None) -> bool:

@@ -33,7 +33,8 @@ from sniff.box.status import BoxStatus, State
 from sniff.capture import loop
 from sniff.capture.config import SourceSpec
 from sniff.cli import box_running
-from sniff.cli.box_running import Box, Plan
+from sniff.cli.box_plan import Plan
+from sniff.cli.box_running import Box
 from sniff.cli.targets import Target
 from sniff.recording import rotation, writer_thread
 from sniff.recording.reader import buses_of
@@ -268,8 +269,8 @@ class Week:
                 (box_running.listening, "start_all", starter(world)),
                 (writer_thread, "open", open_on(world)),
                 (writer_thread, "MOST_WAITING", 20_000),
-                (rotation, "_free", lambda folder: world.free()),
-                (box_running, "_free", lambda folder: world.free()),
+                (rotation, "free_octets", lambda folder: world.free()),
+                (box_running, "free_octets", lambda folder: world.free()),
                 (Path, "unlink", removed),
                 (loop, "IDLE_BEAT", 2 * S),
                 (box_running, "PAGE_EVERY", 5.0),
