@@ -7,75 +7,39 @@ second). Nothing here touches the capture: pausing a view never does.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from typing import overload
+from collections.abc import Iterable
 
 import numpy as np
-import numpy.typing as npt
 
-from dissectors.columns import NONE, VERDICTS, Times, TransactionColumns
+from dissectors.columns import Times
 from dissectors.findings import Finding
-from dissectors.frame import Frame, LineError
+from dissectors.frame import LineError
 from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
-from dissectors.meaning import Meaning
 from dissectors.profiles import Devices
-from dissectors.profiles.decoding import Value, decode
-from dissectors.tracker import Passing, Transaction, Verdict
 from sniff.analysis.load import Load
 from sniff.analysis.nodes import NodeTable
-from sniff.analysis.point_reader import TELLING, meaning_of
 from sniff.analysis.points import PointTable
 from sniff.analysis.polls import Polls
 from sniff.analysis.site_ear import SiteEar
 from sniff.analysis.summary import Summary
-from sniff.analysis.wording import describe, describe_briefly
 from sniff.bus.ascending import Ascending
-from sniff.bus.kept_tables import KeptTables
+from sniff.bus.kept_rows import KeptRows
 from sniff.bus.model import BusModel
 from sniff.bus.prepared import Prepared, prepare
+from sniff.bus.trouble import rows_in_trouble
 from sniff.bus.unjudged import Unjudged
-from sniff.engine.engine import Output, Row
+from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table
 
 KEPT_ROWS = 1_000_000
 """Rows of a live bus kept for viewing; older ones are dropped from the view (never from a recording), with a count."""
 
-BAD_VERDICTS = frozenset(
-    {
-        Verdict.EXCEPTION,
-        Verdict.NO_RESPONSE,
-        Verdict.LATE,
-        Verdict.ECHO,
-        Verdict.UNSOLICITED,
-        Verdict.ANSWERED_TWICE,
-        Verdict.DAMAGED_ANSWER,
-        Verdict.DAMAGED_REQUEST,
-    }
-)
-_BAD = np.array([verdict in BAD_VERDICTS for verdict in VERDICTS], bool)
-_LOOKING = (Passing.POLL, Passing.STATUS)
 
-
-def is_trouble(transaction: Transaction) -> bool:
-    """Whether it went wrong. A master that looks for another one where there is none is no trouble."""
-    in_vain = transaction.kind in _LOOKING and transaction.verdict is Verdict.NO_RESPONSE
-    return transaction.verdict in BAD_VERDICTS and not in_vain
-
-
-def _looked_in_vain(closed: TransactionColumns) -> npt.NDArray[np.bool_]:
-    """Which looked for a station to pass the token to where there is none: masters do that all day."""
-    kinds = [at for at, name in enumerate(closed.names) if name in _LOOKING]
-    nobody: npt.NDArray[np.bool_] = closed.verdict == VERDICTS.index(Verdict.NO_RESPONSE)
-    return nobody & np.isin(closed.kind, kinds) if kinds else np.zeros(len(closed), bool)
-
-
-class Store:
-    """Rows in order of the wire, numbered without holes.
-
-    `kept`: the rows and transactions. `errors`: numbers of rows that are damaged frames or noise, or that have a bad
+class Store(KeptRows):
+    """`errors`: numbers of rows that are damaged frames or noise, or that have a bad
     verdict; `error_total`: with those that were dropped; `failed`: how many of them began in each second. `marks`:
     octets by the line errors reported on them. `gaps`: silence between one row and the next, ns. `version` changes
     whenever anything changed, `heard` whenever more was heard. `ear`: what is kept to hold the bus against others.
@@ -93,11 +57,10 @@ class Store:
     ) -> None:
         """`model`: of this bus, which somebody else feeds, and the `ear` with it; without one it has its own.
         `judge_later`: which takes rows only when `judge` is called; counts and load are up to date all the same."""
+        super().__init__(BusModel(session, dissector, devices) if model is None else model)
         self.keep = keep
         self.ear = ear
         self._feeds_model = model is None
-        self.model = BusModel(session, dissector, devices) if model is None else model
-        self.kept = KeptTables()
         self.errors = Ascending()
         self.failed: Counter[int] = Counter()
         self.line_events: list[LineEvent] = []
@@ -166,16 +129,6 @@ class Store:
         self.version += 1
         self.line_events.append(event)
 
-    def row_marked(self, time: int) -> int | None:
-        """Number of the row that a mark of that moment (ns) is about; None where it has not come yet."""
-        no = self.row_at(time)
-        here, before = self.by_no(no), self.by_no(no - 1)
-        if here is not None and here.event.start == time:
-            return no
-        if before is not None and before.event.end >= time:
-            return no - 1
-        return no if here is not None else None
-
     def _take(self, table: Table, prepared: Prepared | None = None) -> None:
         prepared = prepare(table) if prepared is None else prepared
         self.version += 1
@@ -192,11 +145,7 @@ class Store:
             self._last_end = prepared.end
         first = self.last_no - len(table) + 1
         self._fail(first + prepared.bad, prepared.bad_begins)
-        closed = table.transactions
-        bad = _BAD[closed.verdict] & ~_looked_in_vain(closed)
-        if bad.any():
-            numbers = np.where(closed.request[bad] != NONE, closed.request[bad], closed.response[bad])
-            self._fail(numbers[numbers != NONE], closed.start[bad][numbers != NONE])
+        self._fail(*rows_in_trouble(table.transactions))
         if self._later is not None and len(self) > self.keep:  # what is soon let go is judged first
             self.judge(2 * len(table))
         if len(self) > self.keep * 1.1:
@@ -270,22 +219,7 @@ class Store:
         """What was found so far; nothing as long as there was nothing to judge."""
         return () if self._later is not None and not (self._later.row or self.all_judged) else self.model.findings()
 
-    # -- reading -----------------------------------------------------------------------------------------------
-
-    @property
-    def session(self) -> Session:
-        """Of the bus."""
-        return self.model.session
-
-    @property
-    def dissector(self) -> Dissector:
-        """Its protocol."""
-        return self.model.dissector
-
-    @property
-    def devices(self) -> Devices:
-        """Profiles by station."""
-        return self.model.devices
+    # -- what they add up to ----------------------------------------------------------------------------------
 
     @property
     def summary(self) -> Summary:
@@ -312,103 +246,6 @@ class Store:
         """The master's programme."""
         return self.model.polls
 
-    def __len__(self) -> int:
-        return self.kept.last_no - self.kept.first_no + 1
-
-    @property
-    def rows(self) -> Sequence[Row]:
-        """All rows; each is made when it is asked for."""
-        return _Rows(self.kept)
-
-    @property
-    def first_no(self) -> int:
-        """Number of the oldest row kept (1 when there is none)."""
-        return self.kept.first_no
-
-    @property
-    def last_no(self) -> int:
-        """Number of the newest row (0 when there never was one)."""
-        return self.kept.last_no
-
-    def row_at(self, time: int) -> int:
-        """Number of the first row that begins at `time` (ns) or after; one after the last where there is none."""
-        return self.kept.row_at(time)
-
-    def closed_by_no(self, no: int) -> Transaction | None:
-        """The transaction that closed as number `no` (from 1, without holes), None when dropped or not yet."""
-        return self.kept.closing(no)
-
-    def closed_number(self, transaction: int) -> int | None:
-        """The number under which a transaction closed, by its id; None when dropped or open."""
-        return self.kept.closing_of(transaction)
-
-    @property
-    def last_closed(self) -> int:
-        """How many transactions have closed, with those dropped."""
-        return self.kept.last_closed
-
-    @property
-    def dropped_transactions(self) -> int:
-        """How many of them are no longer in memory."""
-        return self.kept.first_closed - 1
-
-    def by_no(self, no: int) -> Row | None:
-        """The row of that number, None when it was dropped or never was."""
-        return self.kept.row(no)
-
-    def transaction(self, row: Row) -> Transaction | None:
-        """The closed transaction that a row belongs to; None while open, and for noise."""
-        if row.placement is None:
-            return None
-        no = self.kept.closing_of(row.placement.tx)
-        return None if no is None else self.kept.closing(no)
-
-    def partner(self, row: Row) -> int | None:
-        """Number of the response to a request, of the request to a response; None when there is none."""
-        transaction = self.transaction(row)
-        if transaction is None:
-            return None
-        if transaction.request == row.no:
-            return transaction.response
-        return transaction.request
-
-    def text(self, row: Row) -> str:
-        """One line that says what a row is, and what that means to its device."""
-        return describe(self.dissector, row, self.meaning(row))
-
-    def brief_text(self, row: Row, room: int) -> str:
-        """The same in `room` cells, where leaving out some of what it means makes it fit."""
-        return describe_briefly(self.dissector, row, self.meaning(row), room)
-
-    def meant_text(self, row: Row, room: int) -> str:
-        """The same, and nothing but what it means where that is known."""
-        return describe_briefly(self.dissector, row, self.meaning(row), room, raw=False)
-
-    def meaning(self, row: Row) -> Meaning | None:
-        """What is known of a row besides its octets."""
-        return meaning_of(self.dissector, self.devices, row, self._request_of(row))
-
-    def told(self, no: int) -> tuple[Value, ...]:
-        """The values that the row of a number carries; none before its exchange is whole."""
-        row = self.by_no(no)
-        transaction = None if row is None else self.transaction(row)
-        if row is None or transaction is None or transaction.verdict not in TELLING:
-            return ()
-        meaning = self.meaning(row)
-        return () if meaning is None else decode(meaning.profile, meaning.readings)
-
-    def answered(self, row: Row) -> dict[str, int | float | str]:
-        """Fields of an answer that only its request tells."""
-        fields, meaning = self.dissector.answer_fields, self.meaning(row)
-        if fields is None or meaning is None or meaning.request is None or not isinstance(row.event, Frame):
-            return {}
-        return fields(meaning.request, row.event)
-
-    def _request_of(self, row: Row) -> Frame | None:
-        transaction = self.transaction(row)
-        asked = self.by_no(transaction.request) if transaction is not None and transaction.request else None
-        return asked.event if asked is not None and isinstance(asked.event, Frame) else None
-
     def next_error(self, no: int) -> int | None:
         """Number of the first error row after `no`, None when there is none."""
         return self.errors.after(no)
@@ -416,26 +253,3 @@ class Store:
     def previous_error(self, no: int) -> int | None:
         """Number of the last error row before `no`, None when there is none."""
         return self.errors.before(no)
-
-
-class _Rows(Sequence[Row]):
-    """Rows that are made when they are asked for."""
-
-    def __init__(self, kept: KeptTables) -> None:
-        self._kept = kept
-
-    def __len__(self) -> int:
-        return self._kept.last_no - self._kept.first_no + 1
-
-    @overload
-    def __getitem__(self, at: int) -> Row: ...
-    @overload
-    def __getitem__(self, at: slice) -> list[Row]: ...
-
-    def __getitem__(self, at: int | slice) -> Row | list[Row]:
-        if isinstance(at, slice):
-            return [self[index] for index in range(*at.indices(len(self)))]
-        row = self._kept.row(self._kept.first_no + (at if at >= 0 else at + len(self)))
-        if row is None:
-            raise IndexError(at)
-        return row

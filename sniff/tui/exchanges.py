@@ -12,7 +12,8 @@ import numpy.typing as npt
 from dissectors.columns import NONE, VERDICTS
 from dissectors.line import NS_PER_S
 from dissectors.tracker import PASSING, Verdict
-from sniff.bus.rows import BAD_VERDICTS, Store
+from sniff.bus.rows import Store
+from sniff.bus.trouble import BAD_VERDICTS
 
 Values = npt.NDArray[Any]
 

@@ -6,7 +6,7 @@ from rich.cells import cell_len
 
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.sanitizing import sanitized
-from sniff.bus.rows import is_trouble
+from sniff.bus.trouble import is_trouble
 from sniff.engine.engine import Row
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import Cell, Column, fit

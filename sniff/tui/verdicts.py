@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dissectors.tracker import Interval, Transaction, Verdict
 from dissectors.words import bare_milliseconds
-from sniff.bus.rows import is_trouble
+from sniff.bus.trouble import is_trouble
 from sniff.tui import times
 from sniff.tui.columns import Cell
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from textual.app import ComposeResult
 
-from sniff.bus.rows import is_trouble
+from sniff.bus.trouble import is_trouble
 from sniff.tui.analyzer import analyzer
 from sniff.tui.filter_line import FilterLine
 from sniff.tui.index import Known

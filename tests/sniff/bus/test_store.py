@@ -21,7 +21,8 @@ from sniff.bus.model import BusModel
 from sniff.bus.offline import outputs
 from sniff.bus.prepared import prepare
 from sniff.bus.row_masks import ACCEPTED, DOUBTFUL, RowMasks
-from sniff.bus.rows import BAD_VERDICTS, Store
+from sniff.bus.rows import Store
+from sniff.bus.trouble import BAD_VERDICTS
 from sniff.engine.blocks import Block, in_pieces
 from sniff.engine.bulk import tables
 from sniff.engine.engine import Output, Row

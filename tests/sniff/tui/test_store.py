@@ -6,7 +6,7 @@ from typing import Any
 
 from dissectors.frame import LineError, Mark, Role
 from dissectors.tracker import Passing, Transaction, Verdict
-from sniff.bus.rows import is_trouble
+from sniff.bus.trouble import is_trouble
 from sniff.engine.engine import Output
 
 
