@@ -9,10 +9,10 @@ It is told of the newest turns, by how far eight in ten of their times lie apart
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final
 
+from dissectors.histogram import width
 from dissectors.line import MS
 
 TURNS_KEPT: Final = 64
@@ -34,10 +34,5 @@ class Rhythm:
         """Whether from one request to the next takes as long however long the answer takes."""
         if len(self.turns) < _LEAST:
             return False
-        answers = _apart(answer for _, answer in self.turns)
-        return answers >= _DIFFER and _STEADIER * _apart(cycle for cycle, _ in self.turns) <= answers
-
-
-def _apart(times: Iterable[int]) -> int:
-    ordered = sorted(times)
-    return ordered[9 * len(ordered) // 10] - ordered[len(ordered) // 10]
+        answers = width(sorted(answer for _, answer in self.turns))
+        return answers >= _DIFFER and _STEADIER * width(sorted(cycle for cycle, _ in self.turns)) <= answers

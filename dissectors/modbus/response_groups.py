@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from statistics import median
 
+from dissectors.histogram import width
 from dissectors.quick_values import quickly_made
 from dissectors.tracker import Interval
 
@@ -97,7 +98,7 @@ class SameRequest:
         if min(len(quick), len(slow)) < max(GROUP_LEAST, GROUP_SHARE * len(ordered)):
             return None
         gap = min(a.latency.low for a in slow) - max(a.latency.high for a in quick)
-        if gap < max(GAP_LEAST, _width(times[:cut]), _width(times[cut:])):
+        if gap < max(GAP_LEAST, width(times[:cut]), width(times[cut:])):
             return None
         if not self._take_turns(frozenset(answer.no for answer in quick), len(quick), len(slow)):
             return None
@@ -108,11 +109,6 @@ class SameRequest:
         kinds = [answer.no in quick for answer in self.answers]
         runs = 1 + sum(a != b for a, b in pairwise(kinds))
         return runs >= 1 + of_quick * of_slow / (of_quick + of_slow)
-
-
-def _width(times: Sequence[int]) -> int:
-    """Where 80 in 100 of a group lie, ns."""
-    return times[len(times) * 9 // 10] - times[len(times) // 10]
 
 
 def _say_different_things(quick: Sequence[AnsweredRequest], slow: Sequence[AnsweredRequest]) -> bool:

@@ -14,6 +14,7 @@ from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent
 from sniff.engine.table import Table
 from sniff.formats.mark_file import MarksBeside, mark_event, mark_file
+from sniff.recording.rotation import file_octets
 
 LEAST_ROWS = 100_000
 ROW_OCTETS = 120
@@ -91,7 +92,7 @@ class LiveFeed:
             line=self.live.session.line_words,
             protocol=self.live.session.protocol_words,
             recording=None if ended is not None and self.live.file_is_gone else status.path or None,
-            file_size=_size(self._follows) if self._follows else status.size,
+            file_size=file_octets(self._follows) if self._follows else status.size,
             dropped=self.live.unseen + status.lost,
             live=True,
             ended=ended.reason if ended is not None else "",
@@ -125,11 +126,3 @@ class LiveFeed:
         while self.live.ended is None:
             with contextlib.suppress(KeyboardInterrupt):  # then it is told to stop once more
                 self.live.stop(tell)
-
-
-def _size(path: str) -> int:
-    """Octets of a file; 0 where it is gone."""
-    try:
-        return os.stat(path).st_size
-    except OSError:
-        return 0

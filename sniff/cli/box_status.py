@@ -11,7 +11,7 @@ from sniff.box.status import BoxStatus, BusStatus, FindingLine
 from sniff.box.watch import BusWatch
 from sniff.bus.live import LiveBus
 from sniff.capture.config import SourceSpec
-from sniff.recording.rotation import parts
+from sniff.recording.rotation import file_octets, parts
 
 MOST_FINDINGS = 20
 """Findings of a bus on the status page; more are counted."""
@@ -64,7 +64,7 @@ def finding_line(one: Finding, drift: int) -> FindingLine:
 def parts_and_size(path: Path) -> tuple[int, int]:
     """How many parts of a recording there are, and their octets."""
     there = parts(path)
-    return len(there), sum(_size(part) for _, part in there)
+    return len(there), sum(file_octets(part) for _, part in there)
 
 
 def page_json(status: BoxStatus) -> str:
@@ -72,10 +72,3 @@ def page_json(status: BoxStatus) -> str:
     from sniff.cli import json_output
 
     return json_output.dumps(status.to_json())
-
-
-def _size(path: Path) -> int:
-    try:
-        return path.stat().st_size
-    except OSError:
-        return 0

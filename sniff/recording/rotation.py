@@ -148,6 +148,14 @@ def free_octets(folder: Path) -> int | None:
         return None
 
 
+def file_octets(path: str | Path) -> int:
+    """Octets of a file; 0 where it is gone."""
+    try:
+        return os.stat(path).st_size
+    except OSError:
+        return 0
+
+
 def _removed(path: Path, begun: os.stat_result | None) -> bool:
     """Remove a file if it is still the one that was begun, where that is known; whether it is gone from there."""
     try:
