@@ -26,9 +26,11 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from dissectors.line import LineSettings, Timing
+from dissectors.quick_values import quickly_made
 from dissectors.simulated_faults import Fault
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Send:
     """One transmission: `octets` back to back, their first begins at `at` (ns, the bus's clock). Never empty."""

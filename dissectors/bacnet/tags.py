@@ -11,12 +11,15 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
+from dissectors.quick_values import quickly_made
+
 DEPTH_MAX = 16
 """Deepest nesting that is read."""
 
 BOOLEAN = 1
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Tag:
     """One tag with its content: `octets` of a primitive one, or `children` of a pair of opening and closing tags.
@@ -37,6 +40,7 @@ class Tag:
         return self.children is not None
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Tree:
     """What `read` found: the tags, how many octets they take, and why it ended early (None at the end)."""

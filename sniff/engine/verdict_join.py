@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from dissectors.meaning import Meaning
+from dissectors.quick_values import quickly_made
 from dissectors.tracker import Transaction
 from sniff.engine.engine import Output, Row
 
@@ -19,6 +20,7 @@ REMEMBERED = 1000
 Wanted = Callable[[Row, Transaction | None], bool]
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class JudgedRow:
     """A row with the transaction it belongs to (None: noise, or never closed), and what it means to its device."""

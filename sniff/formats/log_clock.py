@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from decimal import Decimal
 
 from dissectors.line import MS, NS_PER_S
+from dissectors.quick_values import quickly_made
 from sniff.formats.log_times import AS_WRITTEN, BARE, EPOCH, Order, Times, day_of
 from sniff.formats.table_cells import MOST, UNITS, seconds
 
@@ -21,6 +22,7 @@ _BEGIN = r"(?<![0-9A-Za-z:.])"
 DAY = 86_400 * NS_PER_S
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Stamp:
     """A time in a line. `time`: ns since the epoch (`dated`), since midnight or since the tool's start. `tick`: ns, the

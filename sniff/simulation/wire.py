@@ -18,12 +18,14 @@ from random import Random
 
 from dissectors.frame import LineError, Mark
 from dissectors.line import LineSettings
+from dissectors.quick_values import quickly_made
 from dissectors.simulated import Party as Party
 from dissectors.simulated import Send
 from dissectors.simulated_faults import NOISE, Fault, Transmission
 from sniff.simulation.collision import ReceivedOctets, low_times, receive
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Sent:
     """One transmission: what its party meant, and what became of it.
@@ -41,6 +43,7 @@ class Sent:
     faults: tuple[str, ...] = ()
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Burst:
     """What the line carried between two silences. Empty `octets`: nothing, the transmission in `sent` was lost.

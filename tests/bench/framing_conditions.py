@@ -12,12 +12,14 @@ from random import Random
 
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
+from dissectors.quick_values import quickly_made
 from tests.bench.framing_traffic import MS, Said
 from tests.bus_delivery import FTDI_LATENCY, ftdi, stalled
 
 NOBODY = -1
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Octet:
     """One octet on the wire. `end`: ns. `of`: the frame it belongs to, NOBODY for what nobody said.
