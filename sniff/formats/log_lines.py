@@ -6,8 +6,10 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum
+from functools import lru_cache
 
 from dissectors.checksums import ends_with_crc16
+from dissectors.quick_values import quickly_made
 from sniff.formats.log_clock import Stamp, stamp_of
 from sniff.formats.log_octets import PAIRS_ONLY, Run, number_in, numbers_in, octets_in, whole_in
 from sniff.formats.log_shapes import COLOURS, REMARK, STAMP, WAYS, Role, shape_of
@@ -19,6 +21,10 @@ LONGEST = 1 << 13
 MOST_MORE = 512
 """Reads that one line tells."""
 _BETWEEN = 60
+
+REMEMBERED, LONGEST_REMEMBERED = 4096, 512
+"""Lines, and characters of one, whose taking apart is remembered: the plan of a log, its clock and its reading look at
+the same first lines, each anew."""
 
 MOST_STAMPS = 3
 """Times in a line that are taken out of it; a program's log around another's has two."""
@@ -57,6 +63,7 @@ class Kind(Enum):
     REMARK = "remark"
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Line:
     """A line of a log. `family`: what lines of one sort have in common (their label); `bare`: it has no label. `way`:
@@ -96,6 +103,11 @@ def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True, times: Times =
     """A line taken apart. `base`, `least`: of numbers, of digits (`octets_in`); `rows`: whether an offset may stand
     before octets; `times`: how its times are read.
     """
+    take_apart = _remembered if len(text) <= LONGEST_REMEMBERED else _taken_apart
+    return take_apart(text, base, rows, times, least)
+
+
+def _taken_apart(text: str, base: int, rows: bool, times: Times, least: int) -> Line:
     text = _SPACES.sub("   ", COLOURS.sub("", text))[:LONGEST].rstrip()
     if not text.strip():
         return EMPTY
@@ -132,6 +144,9 @@ def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True, times: Times =
         samples=samples, cut=is_cut, broken=run.broken,
         more=_more(text, run, base) if told is None else (),
     )  # fmt: skip
+
+
+_remembered = lru_cache(REMEMBERED)(_taken_apart)
 
 
 def pieces(text: str) -> Iterator[str]:
