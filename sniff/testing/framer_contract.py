@@ -16,7 +16,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import lru_cache
+from itertools import cycle, pairwise
 
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -24,6 +25,7 @@ from hypothesis import strategies as st
 from dissectors.frame import Check, Chunk, Event, Frame, LineError, Mark, Noise
 from dissectors.framer import Framer
 from dissectors.line import MS, LineSettings, Timing
+from dissectors.quick_values import quickly_made
 from sniff.testing.driving import drive
 
 EPOCH = 1_767_225_600 * 1_000_000_000
@@ -37,7 +39,15 @@ TIMINGS = st.builds(
     latency=st.sampled_from([0, 1 * MS, 2 * MS, 17 * MS]),
 )
 
+CHOICES = st.binary(min_size=8, max_size=64)
+"""What is decided again and again along a capture, an octet a decision, round and round: to draw each costs more than
+the framer. Zero is the plainest."""
 
+SPOTS = st.lists(st.tuples(st.integers(0, 4095), st.sampled_from(ERRORS)), max_size=3)
+"""Where on a wire a line error is, and which."""
+
+
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Wired:
     """One octet on the wire: when it ended in truth, and the line error it was received with."""
@@ -81,31 +91,34 @@ def rubbish(good_frames: st.SearchStrategy[bytes]) -> st.SearchStrategy[bytes]:
     )
 
 
-@st.composite
-def wires(draw: st.DrawFn, timing: Timing, good_frames: st.SearchStrategy[bytes]) -> list[Wired]:
-    """A stretch of bus, line errors here and there: frames and rubbish with gaps of every size; or a run of them
-    with hardly a silence; or a healthy poll with gaps that are only just proved, or not."""
+@lru_cache(128)
+def stretches(timing: Timing, good_frames: st.SearchStrategy[bytes]) -> st.SearchStrategy[list[tuple[int, bytes]]]:
+    """Frames and rubbish with gaps of every size; or a run of them with hardly a silence; or a healthy poll with gaps
+    that are only just proved, or not."""
     stuff = st.one_of(good_frames, rubbish(good_frames))
     rough = st.tuples(gaps(timing), stuff)
     run_on = st.tuples(st.sampled_from([0, 0, 0, 0, timing.char // 2, 2 * timing.char, timing.t35]), stuff)
     wait = timing.t35 + timing.char
     steady = st.tuples(st.sampled_from([wait, wait, 3 * timing.latency + 8 * wait]), good_frames)
-    pieces = draw(
-        st.one_of(
-            st.lists(rough, max_size=8),
-            st.lists(run_on, min_size=3, max_size=8),
-            st.lists(steady, min_size=3, max_size=6),
-        )
+    return st.one_of(
+        st.lists(rough, max_size=8),
+        st.lists(run_on, min_size=3, max_size=8),
+        st.lists(steady, min_size=3, max_size=6),
     )
+
+
+@st.composite
+def wires(draw: st.DrawFn, timing: Timing, good_frames: st.SearchStrategy[bytes]) -> list[Wired]:
+    """A stretch of bus, line errors here and there."""
     now, wire = EPOCH, []
-    for gap, octets in pieces:
+    for gap, octets in draw(stretches(timing, good_frames)):
         now += gap
         for octet in octets:
             now += timing.char
             wire.append(Wired(now, octet))
     if wire:
-        spots = st.tuples(st.integers(0, len(wire) - 1), st.sampled_from(ERRORS))
-        for at, error in draw(st.lists(spots, max_size=3)):
+        for spot, error in draw(SPOTS):
+            at = spot % len(wire)
             wire[at] = Wired(wire[at].end, wire[at].octet, error)
     return wire
 
@@ -115,15 +128,16 @@ def deliveries(draw: st.DrawFn, timing: Timing, wire: Sequence[Wired]) -> list[C
     """What an honest adapter delivers: no octet later than `timing.latency` after its end, times ascending."""
     chunks: list[Chunk] = []
     at, last = 0, EPOCH
-    lumpy = draw(st.booleans())
+    lumpy, choices = draw(st.booleans()), cycle(draw(CHOICES))
     while at < len(wire):
         latest = max(last, wire[at].end + timing.latency)
         most = at + 1
         while most < len(wire) and wire[most].end <= wire[at].end + timing.latency:
             most += 1
-        to = most if lumpy or most == at + 1 else draw(st.integers(at + 1, most))
+        choice = next(choices)
+        to = most if lumpy else at + 1 + (choice >> 1) % (most - at)
         earliest = max(last, wire[to - 1].end)
-        time = earliest if latest <= earliest else draw(st.sampled_from([earliest, latest]))
+        time = max(earliest, latest) if choice & 1 else earliest
         chunks.append(_chunk(time, wire[at:to]))
         at, last = to, time
     return chunks
@@ -225,14 +239,13 @@ def framer_contract(
         timing = draw(timings)
         return timing, draw(deliveries(timing, draw(wires(timing, good_frames))))
 
-    @st.composite
-    def wild_captures(draw: st.DrawFn) -> tuple[Timing, list[Chunk]]:
-        """Any octets at any times, backwards and huge ones too."""
-        times = st.one_of(st.integers(0, 100 * MS), st.integers(-(10**20), 10**20), st.sampled_from([0, -1, 2**63]))
-        octets = st.one_of(st.binary(max_size=80), good_frames, st.binary(min_size=300, max_size=1200))
-        marks = st.lists(st.builds(Mark, st.integers(-2, 90), st.sampled_from(ERRORS)), max_size=2)
-        chunks = st.builds(lambda t, o, m: Chunk(t, o, tuple(m)), times, octets, marks)
-        return draw(timings), draw(st.lists(chunks, max_size=8))
+    # any octets at any times, backwards and huge ones too
+    times = st.one_of(st.integers(0, 100 * MS), st.integers(-(10**20), 10**20), st.sampled_from([0, -1, 2**63]))
+    wild = st.one_of(st.binary(max_size=80), good_frames, st.binary(min_size=300, max_size=1200))
+    marks = st.lists(st.builds(Mark, st.integers(-2, 90), st.sampled_from(ERRORS)), max_size=2)
+    wild_captures = st.tuples(
+        timings, st.lists(st.builds(lambda t, o, m: Chunk(t, o, tuple(m)), times, wild, marks), max_size=8)
+    )
 
     class FramerContract:
         @relaxed
@@ -245,33 +258,28 @@ def framer_contract(
             check_provenance(events, framer, timing)
 
         @relaxed
-        @given(captures(), st.data())
-        def test_cut_invariance(self, capture: tuple[Timing, list[Chunk]], data: st.DataObject) -> None:
+        @given(captures(), CHOICES)
+        def test_cut_invariance(self, capture: tuple[Timing, list[Chunk]], choices: bytes) -> None:
             timing, chunks = capture
             whole = drive(factory(timing), chunks)
             single = [p for c in chunks for p in cut(c, range(len(c.octets)), timing.char)]
             assert drive(factory(timing), single) == whole
-            other = []
-            for chunk in chunks:
-                places = st.lists(st.integers(1, max(1, len(chunk.octets) - 1)), max_size=4)
-                other += cut(chunk, data.draw(places), timing.char)
+            cuts = cycle(choice >= 192 for choice in choices)
+            other = [p for c in chunks for p in cut(c, [at for at in range(len(c.octets)) if next(cuts)], timing.char)]
             assert drive(factory(timing), other) == whole
 
         @relaxed
-        @given(captures(), st.data())
+        @given(captures(), CHOICES)
         def test_advance_decides_what_the_next_octet_would(
-            self, capture: tuple[Timing, list[Chunk]], data: st.DataObject
+            self, capture: tuple[Timing, list[Chunk]], choices: bytes
         ) -> None:
             timing, chunks = capture
             live = factory(timing)
             events: list[Event] = []
             last = EPOCH
-            moments = data.draw(
-                st.dictionaries(st.integers(0, max(0, len(chunks) - 1)), st.integers(0, 100), max_size=8)
-            )
-            for number, chunk in enumerate(chunks):
-                if number in moments:
-                    events += live.advance(last + (chunk.time - last) * moments[number] // 100)
+            for chunk, choice in zip(chunks, cycle(choices), strict=False):
+                if choice >= 128:  # in some pause, anywhere from its begin to its end
+                    events += live.advance(last + (chunk.time - last) * (choice - 128) // 127)
                 while (due := live.deadline()) is not None and due <= chunk.time:
                     events += live.advance(due)
                 events += live.feed(chunk)
@@ -304,7 +312,7 @@ def framer_contract(
             assert framer.close() == []
 
         @relaxed
-        @given(wild_captures(), st.lists(st.integers(-(10**20), 10**20), max_size=3))
+        @given(wild_captures, st.lists(st.integers(-(10**20), 10**20), max_size=3))
         def test_total(self, capture: tuple[Timing, list[Chunk]], moments: list[int]) -> None:
             timing, chunks = capture
             framer = factory(timing)
@@ -323,8 +331,8 @@ def framer_contract(
             assert framer.advance(10**20) == []
 
         @relaxed
-        @given(timings, rubbish(good_frames), good_frames, st.data())
-        def test_resynchronisation(self, timing: Timing, before: bytes, frame: bytes, data: st.DataObject) -> None:
+        @given(timings, rubbish(good_frames), good_frames)
+        def test_resynchronisation(self, timing: Timing, before: bytes, frame: bytes) -> None:
             spacing = silence + 3 * timing.latency
             wire = [*whole_frames([before], timing, 0), *whole_frames([frame], timing, spacing)]
             shift = len(before) * timing.char
