@@ -22,6 +22,9 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
 os.environ["LANGUAGE"] = "C"
 """Else argparse looks for files of translations at each of its words: 2.6 of the 6.2 ms that a parser takes."""
 
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+"""As the command does it (`sniff/cli`): what numpy multiplies matrices with would start threads in each process."""
+
 os.environ["TEXTUAL_ANIMATIONS"] = "none"
 """What is scrolled to is there at once: nothing is drawn on the way, and no test waits for it."""
 

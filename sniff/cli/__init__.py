@@ -80,6 +80,10 @@ TRACEBACK = "--traceback"
 
 _OURS = ("sniff", "dissectors")
 
+_NO_MATRICES = ("OPENBLAS_NUM_THREADS", "1")
+"""What numpy multiplies matrices with starts a thread a core when it is loaded. Nothing here has a matrix, and to start
+them costs an eighth of a short command."""
+
 
 def main(argv: list[str] | None = None) -> int:
     """Run one command; give its exit code. No exception leaves here but argparse's SystemExit."""
@@ -87,6 +91,7 @@ def main(argv: list[str] | None = None) -> int:
     traced = TRACEBACK in arguments
     arguments = [word for word in arguments if word != TRACEBACK]
     standard_streams.prepare()
+    os.environ.setdefault(*_NO_MATRICES)
     try:
         cut_capture.forget()
         code = _run(arguments)
