@@ -7,7 +7,7 @@ from typing import Any
 
 from dissectors.bacnet import apdu, codec, npdu, services
 from dissectors.bacnet.application import supported
-from dissectors.bacnet.packets import MSTP, NPDU
+from dissectors.bacnet.envelope import npdu_frame
 from dissectors.checksums import sum8
 from dissectors.modbus.envelope import seal_ascii, seal_rtu
 from dissectors.n2.objects import REGIONS
@@ -151,7 +151,7 @@ def n2_answer(fact: Fact) -> Exchange:
 
 
 def _frame(to: int, by: int, octets: bytes) -> bytes:
-    return bytes(MSTP(frame_type=5 if by == 2 else 6, destination=to, source=by) / NPDU(octets))
+    return npdu_frame(to, by, octets, expects_reply=by == 2)
 
 
 def _request(service: int, values: dict[str, Any]) -> bytes:
