@@ -21,6 +21,11 @@ def seeds(many: int, usual: int = 1) -> range:
     return range(many if IS_SEARCH else usual)
 
 
+def examples(many: int) -> int:
+    """Examples of a property for which the usual number is too few: `many` in a search, a third in the suite."""
+    return many if IS_SEARCH else max(25, many // 3)
+
+
 def some(things: Sequence[T], every: int) -> Sequence[T]:
     """All of them in a search, every n-th in the suite."""
     return things if IS_SEARCH else things[::every]

@@ -19,6 +19,7 @@ from sniff.filter import FilterError, Scope, compile_filter
 from sniff.filter.choosing import chosen
 from sniff.filter.fields import COLUMN_TYPES, column_type, types_of
 from sniff.formats import read
+from tests.seeds import examples
 
 CAPTURES = Path(__file__).parents[2] / "captures"
 NAMES = (
@@ -136,7 +137,7 @@ def filters(capture: str) -> st.SearchStrategy[str]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-@settings(deadline=None, max_examples=120, suppress_health_check=[HealthCheck.too_slow])
+@settings(deadline=None, max_examples=examples(120), suppress_health_check=[HealthCheck.too_slow])
 @given(st.data())
 def test_columns_accept_what_rows_accept(name: str, data: st.DataObject) -> None:
     session, rows, columns = capture_of(name)

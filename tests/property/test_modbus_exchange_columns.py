@@ -28,7 +28,7 @@ from tests.bench import bulk_rtu
 from tests.bus_delivery import FTDI_LATENCY, MS, ftdi, laid_out
 from tests.property.kernel_equality import events_of, frame_at, reads_of
 from tests.property.modbus_adus import rtu
-from tests.seeds import seeds
+from tests.seeds import examples, seeds
 
 EXACT = Timing(LineSettings.parse("19200,8E1"))
 HELD_BACK = replace(EXACT, latency=FTDI_LATENCY)
@@ -345,7 +345,7 @@ def test_of_our_captures(path: Path, latency: int) -> None:
     assert_paired_equally(chunks, replace(capture.session.timing, latency=latency))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(st.integers(0, 10**6), st.sampled_from((0.0, 0.05, 0.3)), st.sampled_from(TIMINGS), st.booleans())
 def test_of_any_bus(seed: int, lost: float, timing: Timing, held: bool) -> None:
     frames = said(seed, 250, lost=lost, spread=1 + seed % 40)

@@ -20,7 +20,7 @@ from dissectors.line import Timing
 from tests.bench import bulk_mstp
 from tests.property import mstp_buses as buses
 from tests.property.kernel_equality import assert_equal, reads_of
-from tests.seeds import seeds
+from tests.seeds import examples, seeds
 
 MS = buses.MS
 LATENCIES = (0, 16 * MS)
@@ -107,20 +107,20 @@ def test_a_bad_header_with_a_length_over_the_limit_is_eight_octets() -> None:
         assert_equal(MSTP, [Chunk(buses.START, octets)], Timing(buses.LINE))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 @given(st.data(), buses.timings)
 def test_any_traffic(data: st.DataObject, timing: Timing) -> None:
     assert_equal(MSTP, data.draw(buses.captures(timing)), timing)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(st.data(), buses.timings)
 def test_any_good_frames(data: st.DataObject, timing: Timing) -> None:
     pieces = st.lists(buses.good_frames, min_size=1, max_size=20)
     assert_equal(MSTP, data.draw(buses.captures(timing, pieces)), timing)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 @given(st.lists(buses.good_frames, min_size=2, max_size=12), st.sampled_from(LATENCIES))
 def test_good_frames_back_to_back_are_all_columns(frames: list[bytes], latency: int) -> None:
     """But those of damaged form; a preamble among the data keeps nothing out."""
@@ -130,7 +130,7 @@ def test_good_frames_back_to_back_are_all_columns(frames: list[bytes], latency: 
     assert by_columns >= total - 2
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(st.binary(max_size=300), st.lists(st.integers(-(2**40), 2**40), min_size=1, max_size=5))
 def test_any_octets_at_any_times(octets: bytes, times: list[int]) -> None:
     size = max(1, len(octets) // len(times))
@@ -138,7 +138,7 @@ def test_any_octets_at_any_times(octets: bytes, times: list[int]) -> None:
     assert_equal(MSTP, chunks, Timing(buses.LINE))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(st.data(), st.integers(0, 40))
 def test_blocks_that_know_the_time_before_them(data: st.DataObject, cut: int) -> None:
     """A capture in two blocks: what both say is what one says, the last octets of the first block aside."""

@@ -16,7 +16,7 @@ from dissectors.line import Timing
 from tests.bench import bulk_mstp
 from tests.property import mstp_buses as buses
 from tests.property.pairing_equality import assert_paired_alike
-from tests.seeds import seeds
+from tests.seeds import examples, seeds
 
 MS = buses.MS
 LATENCIES = (0, 16 * MS)
@@ -82,7 +82,7 @@ def test_frames_of_late_reads(seed: int) -> None:
     assert_paired_alike(buses.conversation(dice, 300), timing, dice)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(st.data(), buses.timings)
 def test_any_traffic(data: st.DataObject, timing: Timing) -> None:
     assert_paired_alike(data.draw(buses.captures(timing)), timing)

@@ -25,7 +25,7 @@ from tests.bus_delivery import FTDI_LATENCY, MS, ftdi, laid_out, stalled, with_n
 from tests.captures_shared import listed, timed
 from tests.property.kernel_equality import assert_equal, reads_of
 from tests.property.modbus_adus import rtu, rtu_frames
-from tests.seeds import seeds
+from tests.seeds import examples, seeds
 
 EXACT = Timing(LineSettings.parse("19200,8E1"))
 FAST = Timing(LineSettings.parse("115200,8N1"))
@@ -157,7 +157,7 @@ def _apart(frames: list[bytes], timing: Timing, pause: int = 6 * MS) -> list[Chu
     ids=["usual", "all", "vendor"],
 )
 def test_of_buses_with_silences(codes: tuple[int, ...], least: float) -> None:
-    for seed in range(2):
+    for seed in seeds(2):
         for timing in TIMINGS:
             by_columns, total = assert_equal(RTU, _apart(bus(seed, 300, codes), timing), timing)
             assert by_columns >= least * total
@@ -169,7 +169,7 @@ def test_of_buses_with_silences(codes: tuple[int, ...], least: float) -> None:
     ids=["usual", "all", "vendor"],
 )
 def test_of_buses_behind_a_slow_adapter(codes: tuple[int, ...], least: float) -> None:
-    for seed in range(3):
+    for seed in seeds(3):
         for timing in (HELD_BACK, replace(FAST, latency=FTDI_LATENCY)):
             wire = laid_out(bus(seed, 400, codes), timing, 3 * MS)
             by_columns, total = assert_equal(RTU, ftdi(wire), timing)
@@ -315,7 +315,7 @@ def test_of_line_errors() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", seeds(2))
 def test_of_random_octets(seed: int) -> None:
     dice = random.Random(seed)
     for timing in TIMINGS:
@@ -343,7 +343,7 @@ _pieces = st.one_of(
 _pauses = st.sampled_from((0, 0, MS, 2 * MS, 5 * MS, 19 * MS, 50 * MS, -3 * MS))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 @given(st.lists(st.tuples(_pieces, _pauses, st.integers(0, 30)), max_size=30), st.sampled_from(TIMINGS))
 def test_of_any_cut(said: list[tuple[bytes, int, int]], timing: Timing) -> None:
     chunks, now = [], 10**9
@@ -401,7 +401,7 @@ def test_blocks_that_begin_behind_the_last_frame_told(seed: int, size: int, timi
 # --- tables ----------------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 @given(
     st.lists(st.one_of(rtu_frames, st.binary(min_size=4, max_size=40)), min_size=1, max_size=10), st.integers(2, 300)
 )

@@ -16,6 +16,7 @@ from sniff.engine.capture import CaptureError
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session
 from sniff.formats import text
 from sniff.formats.text import parse, render
+from tests.seeds import examples
 
 TIMES = st.integers(-(2**61), 2**61)
 PLAIN = st.text(st.characters(exclude_categories=("Cs",)), max_size=12)
@@ -79,7 +80,7 @@ COMPLAINT = re.compile(r"<text>:\d+:\d+: expected .*, found .*")
 
 
 @given(st.one_of(FRAGMENTS, st.text(max_size=200)))
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=examples(300))
 def test_any_text(text: str) -> None:
     try:
         capture = parse(text)

@@ -27,6 +27,7 @@ from dissectors.bacnet.packets import (
 )
 from dissectors.frame import Check, Chunk, Event, Frame, Role
 from tests.dissectors.bacnet.captures import TIMING, drive, frame_of, tagged_frames
+from tests.seeds import examples
 
 TAGGED = tagged_frames()
 notes = pytest.mark.skipif(not TAGGED, reason="no protocol notes beside the project")
@@ -202,14 +203,14 @@ npdus = st.one_of(
 )
 
 
-@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None, max_examples=200)
+@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None, max_examples=examples(200))
 @given(st.sampled_from([3, 5, 6, 9, 32, 33, 34, 90, 128, 255]), npdus)
 def test_whatever_a_good_frame_carries(frame_type: int, data: bytes):
     octets = frame(frame_type, 5, 2, data)
     _stand(frame_of(octets))
 
 
-@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None, max_examples=150)
+@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None, max_examples=examples(150))
 @given(
     st.lists(st.one_of(st.binary(max_size=30), npdus.map(lambda d: frame(6, 5, 2, d)[:-1]), st.just(b"\x55\xff\x06")))
 )

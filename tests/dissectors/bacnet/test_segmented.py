@@ -39,6 +39,7 @@ from tests.dissectors.bacnet.segmented_bus import (
     without,
     writes,
 )
+from tests.seeds import examples
 
 INVOKE = 33
 SIZE = 50
@@ -441,7 +442,7 @@ def frames_of(steps: list[Step]) -> list[Frame]:
 STEPS = [*answered(12, 2).steps, *written(12, 3).steps, *answered(15, 4, server=Party(5, 13, b"\x10")).steps]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(st.lists(st.tuples(st.sampled_from(STEPS), st.sampled_from([0.0, 3.0, 300.0, 600.0, 11_000.0, 40_000.0]))))
 def test_whatever_passes_each_transaction_closes_once(drawn: list[tuple[Step, float]]):
     output = run([Step(step.name, silence, step.octets) for step, silence in drawn])
@@ -453,7 +454,7 @@ def test_whatever_passes_each_transaction_closes_once(drawn: list[tuple[Step, fl
         assert one.of is None or one.of < one.id
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(st.randoms(use_true_random=False), st.integers(0, 30))
 def test_what_is_called_whole_is_whole(rng: random.Random, lost: int):
     """Segments of three different answers, in any order, some lost and repeated: never a mixture that was not sent."""

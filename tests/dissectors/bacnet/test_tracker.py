@@ -15,6 +15,7 @@ from dissectors.bacnet.envelope import frame, npdu_frame
 from dissectors.frame import Chunk, Event, Frame, Role
 from dissectors.line import LineSettings, Timing
 from dissectors.tracker import Placement, Transaction, Verdict
+from tests.seeds import examples
 
 MS = 1_000_000
 LINE = LineSettings(38400)
@@ -331,7 +332,7 @@ def test_segments_that_follow_a_damaged_request_belong_to_what_they_began():
     assert {tx.id: tx.verdict for tx in run.closed}[2] is Verdict.DAMAGED_REQUEST
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(st.lists(st.tuples(st.sampled_from([0, 1, 20, 260, 600, 11_000]), BUS), max_size=25))
 def test_whatever_passes_each_transaction_closes_once(steps: list[tuple[float, bytes]]):
     run = track(*steps)
@@ -357,7 +358,7 @@ def test_noise_after_a_long_silence_ends_what_waited():
     assert [t.verdict for t in run.closed] == [Verdict.NO_RESPONSE]
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=examples(80), deadline=None)
 @given(st.lists(st.tuples(st.sampled_from([1, 20, 260, 600, 11_000]), BUS), max_size=15), st.data())
 def test_live_and_saved_give_the_same(steps: list[tuple[float, bytes]], data: st.DataObject):
     framer, live, now = MSTP.framer(TIMING), MSTP.tracker(TIMING), 10**18

@@ -14,6 +14,7 @@ from sniff.bus.offline import settled
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import with_settings
 from sniff.formats import bytelog, read
+from tests.seeds import examples
 
 REQUEST, ANSWER = bytes.fromhex("010300000002C40B"), bytes.fromhex("01030400D7001ACBC0")
 CHAR = LineSettings.parse("19200,8E1").char
@@ -143,7 +144,7 @@ def test_logic_analyser_csv_of_others(name: str, line: str, count: int) -> None:
     assert all(isinstance(row, Frame) and row.ok for row in rows)
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=200)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=examples(200))
 @given(kind=st.sampled_from(sorted(LOGS)), place=st.floats(0, 0.999), text=st.text(max_size=3), cut=st.floats(0, 1))
 def test_any_change_is_no_traceback(tmp_path: Path, kind: str, place: float, text: str, cut: float) -> None:
     whole = LOGS[kind]

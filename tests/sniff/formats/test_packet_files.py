@@ -25,6 +25,7 @@ from sniff.formats.linktypes import USER1
 from sniff.formats.pcapng import PcapngWriter
 from sniff.formats.records import PacketRecord
 from sniff.formats.text import parse
+from tests.seeds import examples
 from tests.sniff.formats.written_anew import write_anew
 
 MODBUS = """\
@@ -187,7 +188,7 @@ def test_cut_anywhere_gives_what_was_before_the_cut(tmp_path: Path, small: dict[
     assert whole < 20  # only a cut between two records looks whole
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=300, deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=examples(300), deadline=None)
 @given(name=st.sampled_from(["x.pcap", "x.pcapng"]), place=st.floats(0, 0.999), octet=st.integers(0, 255))
 def test_any_octet_changed_is_no_traceback(
     tmp_path: Path, small: dict[str, bytes], name: str, place: float, octet: int

@@ -18,6 +18,7 @@ from sniff.recording.frames import FrameBatch, FrameLog, encode
 from sniff.recording.reader import McapCapture, read
 from sniff.recording.topics import FRAMES
 from sniff.recording.writer import Recorder
+from tests.seeds import examples
 
 I64 = st.integers(-(2**63) + 1, 2**63 - 1)
 OCTETS = st.binary(max_size=20)
@@ -101,7 +102,7 @@ def test_what_was_encoded_comes_back(some: list[Row], transactions: list[Transac
 
 
 @given(st.data())
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=examples(150))
 def test_damage_never_crashes(data: st.DataObject) -> None:
     some = [Row(1, Noise(b"ab", 1, 2, Place.AFTER, Reason.PAD, (Mark(1, LineError.BREAK),)))]
     some.append(

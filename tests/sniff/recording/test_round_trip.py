@@ -15,6 +15,7 @@ from dissectors.line import LineSettings
 from sniff.bus.capture_writer import create
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session
 from sniff.formats import read
+from tests.seeds import examples
 
 BASE = 1_772_359_200_000_000_000
 SESSION = Session(
@@ -56,7 +57,7 @@ def _without_comments(items: Iterable[Item]) -> list[Item]:
     return [item for item in items if not _is_comment(item)]
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=examples(60))
 @given(ITEMS)
 @pytest.mark.parametrize("suffix", [".mcap", ".cap.txt"])
 def test_items_come_back(tmp_path_factory: pytest.TempPathFactory, suffix: str, items: list[Item]) -> None:
