@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import pytest
-
 SNIFF = Path(__file__).parents[2] / "sniff"
 NAMES = re.compile(r"modbus|bacnet|\bms/?tp\b|\bmstp|metasys|\bn2\b|profibus|\brtu\b", re.IGNORECASE)
 
@@ -14,11 +12,12 @@ OTHERS_TOOLS = {"log_shapes.py"}
 """Data about tools of others, which bear the names of protocols."""
 
 
-@pytest.mark.parametrize(
-    "path",
-    sorted(path for path in SNIFF.rglob("*.py") if path.name not in OTHERS_TOOLS),
-    ids=lambda path: str(path.relative_to(SNIFF)),
-)
-def test_no_module_names_a_protocol(path: Path) -> None:
-    named = [f"{no}: {line.strip()}" for no, line in enumerate(path.read_text().splitlines(), 1) if NAMES.search(line)]
-    assert named == []
+def test_no_module_names_a_protocol() -> None:
+    paths = sorted(path for path in SNIFF.rglob("*.py") if path.name not in OTHERS_TOOLS)
+    assert len(paths) > 400
+    assert [
+        f"{path.relative_to(SNIFF)}:{no}: {line.strip()}"
+        for path in paths
+        for no, line in enumerate(path.read_text().splitlines(), 1)
+        if NAMES.search(line)
+    ] == []

@@ -38,11 +38,11 @@ def repairs(events: list[Event]) -> list[Repair | None]:
 
 
 @pytest.mark.parametrize("latency", [0, 17 * MS])
-@pytest.mark.parametrize("junk", [b"x", b":", b"4", b"\xff", b"A", b">", b"N", b"9A", b"> ", b"xyz", b">>>", b"\x00A1"])
 @pytest.mark.parametrize(("command", "answer"), EXCHANGES)
-def test_junk_directly_before_an_answer_costs_nothing(command, answer, junk, latency):
-    events = wire(POLL, ACK, command, junk + answer, latency=latency)
-    assert good(events) == [POLL, ACK, command, answer]
+def test_junk_directly_before_an_answer_costs_nothing(command, answer, latency):
+    for junk in (b"x", b":", b"4", b"\xff", b"A", b">", b"N", b"9A", b"> ", b"xyz", b">>>", b"\x00A1"):
+        events = wire(POLL, ACK, command, junk + answer, latency=latency)
+        assert good(events) == [POLL, ACK, command, answer], junk
 
 
 @pytest.mark.parametrize("latency", [0, 17 * MS])
