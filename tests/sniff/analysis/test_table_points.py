@@ -42,22 +42,22 @@ def of_tables(path: Path, size: int) -> Iterator[TableSamples]:
 
 
 @pytest.mark.parametrize("path", CAPTURES, ids=lambda path: path.name)
-@pytest.mark.parametrize("size", [1, 5, 100_000])
-def test_samples_and_points_of_tables_are_those_of_rows(path: Path, size: int) -> None:
+def test_samples_and_points_of_tables_are_those_of_rows(path: Path) -> None:
     capture = read(path)
     reader = PointReader(dissector_for(capture.session))
     samples: list[Sample] = []
     for output in outputs(capture.items(), capture.session):
         if isinstance(output, Output):
             samples += reader.add(output)
-    expected, points = PointTable(), PointTable()
+    expected = PointTable()
     expected.add(samples)
-    together = list(of_tables(path, size))
-    assert [sample for some in together for sample in some.in_order()] == samples
-    for some in together:
-        add_to(points, some)
-    assert list(points) == list(expected)
-    assert points.version == expected.version
+    for size in (1, 5, 100_000):
+        points, together = PointTable(), list(of_tables(path, size))
+        assert [sample for some in together for sample in some.in_order()] == samples, size
+        for some in together:
+            add_to(points, some)
+        assert list(points) == list(expected), size
+        assert points.version == expected.version
 
 
 EXCHANGES = [

@@ -33,7 +33,7 @@ def _files() -> list[Path]:
     )
 
 
-@pytest.mark.parametrize("path", some(_files(), 3), ids=lambda path: f"{path.parent.name}-{path.name}")
+@pytest.mark.parametrize("path", some(_files(), 4), ids=lambda path: f"{path.parent.name}-{path.name}")
 def test_sure_is_right(path: Path) -> None:
     try:
         session = read(path).session

@@ -62,9 +62,9 @@ BUSES = settings(deadline=None, max_examples=12)
 def bus_of(name: str) -> tuple[Session, Block]:
     """A short damaged bus."""
     if name == "mstp":
-        reads = bulk_mstp.reads(600, 3, damaged=0.04, answered=0.8)
+        reads = bulk_mstp.reads(400, 3, damaged=0.04, answered=0.8)
         return Session("bus", bulk_mstp.LINE, "mstp"), Block(reads)
-    table, length = bulk_rtu.frames(400)
+    table, length = bulk_rtu.frames(300)
     reads = bulk_rtu.bus(bulk_rtu.damaged(table, length, 0.04), length, bulk_rtu.TIMING)
     return Session("bus", LineSettings.parse("19200,8E1"), "modbus-rtu"), Block(reads)
 

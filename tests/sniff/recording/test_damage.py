@@ -22,6 +22,7 @@ from sniff.recording.batcher import Batcher
 from sniff.recording.part import PartFile
 from sniff.recording.reader import McapCapture
 from sniff.recording.topic_message import Message
+from tests.seeds import IS_SEARCH
 
 A_CHUNK = 6  # items a chunk of the small file
 BASE = 1_772_359_200_000_000_000
@@ -121,9 +122,17 @@ def test_cut_at_every_octet(tmp_path: Path, small: tuple[bytes, list[Item], list
 
 
 def places(octets: bytes) -> list[int]:
-    """Every octet up to the summary, and every fifth of it: there it is the same over and over."""
+    """Every octet at the begin and the end of each record up to the summary, every third within (every octet where one
+    searches), and every fifth of the summary: there it is the same over and over."""
     data_end = octets.index(struct.pack("<BQ", scan.DATA_END, 4)) + 13
-    return [*range(data_end + 9), *range(data_end + 9, len(octets) - 40, 5), *range(len(octets) - 40, len(octets))]
+    edges, at = {0}, 8
+    while at < data_end:
+        edges |= {at - 2, at - 1, *range(at, at + 12)}
+        at += 9 + int.from_bytes(octets[at + 1 : at + 9], "little")
+    assert at == data_end
+    data = [at for at in range(data_end) if at in edges or IS_SEARCH or at % 3 == 0]
+    rest = [*range(data_end, data_end + 9), *range(data_end + 9, len(octets) - 40, 5)]
+    return [*data, *rest, *range(len(octets) - 40, len(octets))]
 
 
 def test_any_octet_changed(tmp_path: Path, small: tuple[bytes, list[Item], list[int]]) -> None:
@@ -131,7 +140,7 @@ def test_any_octet_changed(tmp_path: Path, small: tuple[bytes, list[Item], list[
     path = tmp_path / "a.mcap"
     path.write_bytes(octets)
     with path.open("r+b", buffering=0) as file:
-        for offset in places(octets)[::3]:
+        for offset in places(octets)[::2]:
             file.seek(offset)
             file.write(bytes([octets[offset] ^ (0xFF if offset % 2 else 0x01)]))
             capture = opened(path)
