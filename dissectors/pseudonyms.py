@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
+from itertools import filterfalse
 from typing import Protocol
 
 from dissectors.frame import Frame
@@ -20,18 +21,15 @@ class Pseudonyms:
     forbidden to one class stays so. A number of no class stays as it is.
     """
 
-    def __init__(self, *classes: Iterable[int], kept: Iterable[int]) -> None:
+    def __init__(self, *classes: range, kept: Iterable[int]) -> None:
         self._known = {number: number for number in kept}
-        self._free: dict[int, Iterator[int]] = {}
-        for numbers in classes:
-            names = [number for number in numbers if number not in self._known]
-            self._free.update(dict.fromkeys(names, iter(names)))
+        self._classes = [(numbers, filterfalse(frozenset(self._known).__contains__, numbers)) for numbers in classes]
 
     def of(self, number: int) -> int:
         """The pseudonym of a number; itself when all are used up."""
         if number not in self._known:
-            free = self._free.get(number)
-            self._known[number] = number if free is None else next(free, number)
+            free = next((names for numbers, names in self._classes if number in numbers), iter(()))
+            self._known[number] = next(free, number)
         return self._known[number]
 
     def if_known(self, number: int) -> int:
