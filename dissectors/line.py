@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 from dissectors.quick_values import quickly_made
 
@@ -50,16 +51,25 @@ class LineSettings:
     @property
     def bits_per_char(self) -> float:
         """Bits on the wire for one character: start, data, parity, stop."""
-        return 1 + self.data_bits + (self.parity != "N") + self.stop_bits
+        return _bits(self.data_bits, self.parity, self.stop_bits)
 
     @property
     def char(self) -> int:
         """Time of one character, ns, rounded down."""
-        return int(self.bits_per_char * NS_PER_S // self.baud)
+        return _char(self.baud, self.data_bits, self.parity, self.stop_bits)
 
     def bits(self, count: float) -> int:
         """Time of `count` bits, ns."""
         return int(count * NS_PER_S // self.baud)
+
+
+def _bits(data: int, parity: str, stop: float) -> float:
+    return 1 + data + (parity != "N") + stop
+
+
+@lru_cache(256)  # asked for with nearly every frame
+def _char(baud: int, data: int, parity: str, stop: float) -> int:
+    return int(_bits(data, parity, stop) * NS_PER_S // baud)
 
 
 @quickly_made

@@ -17,6 +17,7 @@ _NUMBERED = re.compile(r"#\d+\b.*\b[0-9A-Fa-f]{2} [0-9A-Fa-f]{2}\b")
 
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 _WRITTEN = frozenset((*range(0x20, 0x7F), *b"\t\n\r\f\x1b", *range(0x80, 0x100)))
+_HIGH = bytes(range(0x80, 0x100))
 """Octets that text is made of, in any code that ASCII is part of; escapes colour the output of tools."""
 
 _CONTROLS_MOST = 0.01
@@ -76,9 +77,9 @@ def utf16_of(start: bytes) -> str | None:
 
 def is_written(start: bytes) -> bool:
     """Whether nearly all octets are those of text."""
-    others = sum(start.count(octet) for octet in range(256) if octet not in _WRITTEN)
-    high = sum(1 for octet in start[:4096] if octet >= 0x80)
-    return others <= _CONTROLS_MOST * len(start) and 2 * high <= len(start[:4096])
+    others = start.translate(None, delete=bytes(_WRITTEN))
+    low = start[:4096].translate(None, delete=_HIGH)
+    return len(others) <= _CONTROLS_MOST * len(start) and 2 * len(low) >= len(start[:4096])
 
 
 def _is_ascii_traffic(start: bytes) -> bool:

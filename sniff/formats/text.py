@@ -52,7 +52,7 @@ from sniff.engine.session import (
     settings_change,
 )
 from sniff.formats.files import NewFile, explain, open_capture
-from sniff.formats.text_line import DEVICE, EPOCH, HEADER, LATEST, MAGIC, MARKS, VERSION, Line, is_device
+from sniff.formats.text_line import DEVICE, EPOCH, HEADER, LATEST, MAGIC, MARKS, VERSION, Line, is_device, plain_chunk
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
@@ -101,14 +101,13 @@ class TextCapture:
         line = self._speed
         last = self.session.started
         for number, text in enumerate(self._lines, 1):
-            reading = Line(self.name, number, text)
             stripped = text.strip()
             if stripped.startswith("#!") and not stripped.startswith(MAGIC):
-                event = reading.event(last)
+                event = Line(self.name, number, text).event(last)
                 line = _changed(line, event)
                 yield event
             elif stripped and not stripped.startswith("#"):
-                chunk = reading.chunk(last, line)
+                chunk = plain_chunk(stripped, last) or Line(self.name, number, text).chunk(last, line)
                 last = chunk.time
                 yield chunk
 

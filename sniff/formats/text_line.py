@@ -54,6 +54,23 @@ _START = re.compile(r"(\d{4}-\d\d-\d\d)[Tt ](\d\d:\d\d:\d\d)(?:\.(\d{1,9}))?(Z|z
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
+_PLAIN = re.compile(
+    r"([+-])([0-9]{1,15})(?:\.([0-9]{1,6}))?[ \t]+([0-9A-Fa-f]{2}(?:[ \t]*[0-9A-Fa-f]{2})*)[ \t]*(?:#.*)?", re.DOTALL
+)
+"""Nearly every line: a delay, pairs, perhaps a comment."""
+
+
+def plain_chunk(stripped: str, last: int) -> Chunk | None:
+    """The chunk of a line without anything unusual, in a fifth of the time; None where `Line` must look closer."""
+    match = _PLAIN.fullmatch(stripped)
+    if match is None:
+        return None
+    sign, whole, part, octets = match.groups()
+    delay = int(whole) * MS + (int(part.ljust(6, "0")) if part else 0)
+    time = last - delay if sign == "-" else last + delay
+    return Chunk(time, bytes.fromhex(octets)) if -LATEST <= time <= LATEST else None
+
+
 class Line:
     """One line being read from the left; every complaint says file, line and column."""
 

@@ -13,9 +13,11 @@ from sniff.engine.capture import CaptureError
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session
 from sniff.formats import read
 from sniff.formats.text import LONGEST_LINE, parse, render
+from sniff.formats.text_line import Line, plain_chunk
 
 P, F, B, O = LineError.PARITY, LineError.FRAMING, LineError.BREAK, LineError.OVERRUN  # noqa: E741
 START = 1_772_359_200_000_000_000  # 2026-03-01T10:00:00Z
+PLAIN = "+-.0123456789abcdefABCDEF \t"
 MS = 1_000_000
 
 BY_HAND = """\
@@ -293,3 +295,21 @@ def test_a_file_that_cannot_be_created(tmp_path: Path) -> None:
     (tmp_path / "d.cap.txt").mkdir()
     with pytest.raises(CaptureError, match="a directory"):
         create(tmp_path / "d.cap.txt", SESSION)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "+8.2 01 03 04", "-8.000001 0103 04", "+0\t01\t0304   # a comment", "+1.5 01 03#next", "+1 0103 04 # 7 é",
+        "+99999999999999 01 03", "-3 01 03", "+1 01 0", "+1 01 0G", "+1.1234567 01", "+1.5.2 01", "~4 01", "+1 01!P",
+        '+1 01 "a"', "+1", "+1 # 01", "+ 1 01", "+1  01\x0b02", "+1\u00a001",
+    ],
+)  # fmt: skip
+def test_a_plain_line_is_what_a_closer_look_finds(line: str) -> None:
+    plain = plain_chunk(line, START)
+    try:
+        closer = Line("x", 1, line).chunk(START, LineSettings())
+    except CaptureError:
+        closer = None
+    assert plain in (None, closer)
+    assert (plain is None) == (closer is None or bool(closer.marks) or not set(line.partition("#")[0]) <= set(PLAIN))
