@@ -25,7 +25,7 @@ from tests.bus_delivery import FTDI_LATENCY, MS, ftdi, laid_out, stalled, with_n
 from tests.captures_shared import listed, timed
 from tests.property.kernel_equality import assert_equal, reads_of
 from tests.property.modbus_adus import rtu, rtu_frames
-from tests.seeds import examples, seeds
+from tests.seeds import IS_SEARCH, examples, seeds
 
 EXACT = Timing(LineSettings.parse("19200,8E1"))
 FAST = Timing(LineSettings.parse("115200,8N1"))
@@ -178,7 +178,7 @@ def test_of_buses_behind_a_slow_adapter(codes: tuple[int, ...], least: float) ->
 
 @pytest.mark.parametrize("high", [0x14, 0x26, 0x9C])
 def test_of_addresses_like_byte_counts(high: int) -> None:
-    frames = reads_at(high, high, 250)
+    frames = reads_at(high, high, 250 if IS_SEARCH else 150)
     dice = random.Random(high)
     for timing in (HELD_BACK, replace(FAST, latency=FTDI_LATENCY)):
         by_columns, total = assert_equal(RTU, ftdi(laid_out(frames, timing, 3 * MS)), timing)
@@ -250,7 +250,7 @@ def test_of_disturbed_buses(seed: int, timing: Timing) -> None:
     dice = random.Random(seed)
     for codes in ((3, 6, 16), _ALL, _RARE):
         for share in (0.02, 0.3):
-            frames = _disturbed(bus(seed, 150, codes), dice, share)
+            frames = _disturbed(bus(seed, 150 if IS_SEARCH else 100, codes), dice, share)
             assert_equal(RTU, _apart(frames, timing), timing)
             assert_equal(RTU, _glued(frames, timing, dice), timing)
             wire = laid_out(frames, timing, dice.choice((0, timing.t15, timing.t35, 4 * MS)))
