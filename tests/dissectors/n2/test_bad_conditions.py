@@ -10,6 +10,7 @@ import pytest
 from tests.bench.framing_conditions import CONDITIONS
 from tests.bench.framing_table import DELIVERIES, Measured, Share, measure
 from tests.bench.framing_traffic import TRAFFIC, Traffic
+from tests.seeds import IS_SEARCH
 
 JUNK = ("1-3 junk octets a gap", "1-3 junk directly before", "1-3 junk directly after")
 DAMAGED = ("bit errors 1e-4", "bit errors 1e-3", "bit errors 3e-3", "lost octets 3e-3", "truncated 5 %")
@@ -24,7 +25,7 @@ def measured(name: str, delivery: str) -> Measured:
 
 @cache
 def traffic() -> Traffic:
-    return TRAFFIC["n2"](Random(7), 1500)
+    return TRAFFIC["n2"](Random(7), 1500 if IS_SEARCH else 1000)
 
 
 def at_least(share: Share, least: float) -> bool:
