@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from dissectors.line import LineSettings
+from sniff.cli import main
 from sniff.formats import read
 from sniff.simulation.bus import VirtualBus
 from sniff.simulation.ports import HAS_PTY
@@ -92,6 +93,5 @@ def test_a_file_that_exists_is_refused_before_it_is_lost(tmp_path: Path) -> None
     path = tmp_path / "kept.mcap"
     path.write_bytes(b"precious")
     with VirtualBus.from_scenario(scenario("n2", 1, False)) as bus:
-        ran = sniff485("record", bus.tap(), "-p", "auto", "-w", str(path), "--duration", "1")
-    assert ran.returncode == 3
+        assert main(["record", bus.tap(), "-p", "auto", "-w", str(path), "--duration", "1"]) == 3
     assert path.read_bytes() == b"precious"

@@ -21,6 +21,7 @@ from sniff.recording.reader import McapCapture
 
 pytest.importorskip("termios")
 
+from sniff.cli import main
 from tests.e2e.recording_bus import wait_until
 from tests.e2e.running import rest_of
 
@@ -140,12 +141,19 @@ def test_a_port_that_goes_does_not_stop_the_others(tmp_path: Path, lines: list[L
         (["--all"], "no bus with a port is configured"),
     ],
 )
-def test_what_cannot_be_meant_is_said(words: list[str], said: str, lines: list[Line], record, tmp_path: Path) -> None:
+def test_what_cannot_be_meant_is_said(
+    words: list[str],
+    said: str,
+    lines: list[Line],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
     named = [str(tmp_path / word) if not word.startswith("-") else word for word in words]
-    process = record(*named, "-s", "9600,8N1")
-    _, errors = rest_of(process)
-    assert process.returncode == 2
-    assert said in errors
+    assert main(["record", *named, "-s", "9600,8N1", "-w", "site.mcap"]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "site.mcap").exists()
 
 
 def test_all_buses_of_the_configuration(tmp_path: Path, lines: list[Line], record) -> None:
