@@ -88,7 +88,7 @@ class Dissector:
     `judge`: makes the rules at work on a bus; `rules`: their catalogue, by code.
     `ring`: how its token ring is watched and shown, if it passes a token.
     `readings`: what exchanges say of the things inside a station; `refusal`: the code with which one refuses.
-    `reading_columns`: `readings` of many exchanges at once, as far as they are plain registers or say nothing.
+    `reading_columns`: `readings` of many exchanges at once, as far as they are numbers or say nothing.
     `questions`: what its requests ask, without the values that they carry.
     `register_maps`: reads maps of registers that others wrote.
     `packet_file`: how its frames lie in packet files.

@@ -183,6 +183,11 @@ def plain_name(space: str, address: int) -> str:
     return f"{space}/{first}{address + 1:0{4 if address < 9999 else 5}d}"
 
 
+def point_name(space: str, address: int, part: str = "") -> str:
+    """The same with an attribute or property: "AI/9/priority"."""
+    return plain_name(space, address) + (f"/{part}" if part else "")
+
+
 def state_words(entry: Entry, value: int) -> str:
     """The state or code in the maker's words, empty when it has none."""
     return entry.states.get(value, "")
@@ -213,7 +218,7 @@ def each_bit(entry: Entry, raw: int) -> list[tuple[str, EntryRole]]:
 
 
 def _plain(reading: Reading) -> Value:
-    name = plain_name(reading.space, reading.address) + (f"/{reading.part}" if reading.part else "")
+    name = point_name(reading.space, reading.address, reading.part)
     quality = _quality(reading, reading.value)
     return Value(name, reading.value, reading.raw, "", quality, reading, words=_spoken(reading))
 

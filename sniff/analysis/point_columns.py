@@ -1,19 +1,24 @@
-"""Samples of many exchanges as columns: plain registers, of stations without a profile. Pure."""
+"""Samples of many exchanges as columns: numbers, of stations without a profile. Pure."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from dissectors.columns import NONE, Codes, Masks, Numbers, Times
+from dissectors.columns import NONE, Codes, Masks, Names, Numbers, Times
 from dissectors.histogram import Histogram
-from dissectors.profiles.decoding import Quality, Value, plain_name
-from dissectors.reading_columns import HOWS
+from dissectors.profiles.decoding import Quality, Value, point_name
+from dissectors.reading_columns import HOWS, Bits, ToldValues
 from dissectors.readings import Origin, Reading
 from sniff.analysis.point_reader import Sample, station_name
 from sniff.analysis.points import HISTORY, Key, PointTable, SampleRun
+
+MANY = 12
+"""Samples of one point in a table that are quicker taken together than one by one."""
 
 _WRITE = HOWS.index(Origin.WRITE)
 
@@ -22,45 +27,79 @@ _WRITE = HOWS.index(Origin.WRITE)
 class PlainSamples:
     """One entry a sample, in the order of closing. `order`: place of its exchange, ascending. `device`: `NONE` for all.
 
-    The others as in `Sample` and its `Reading`; `space` and `how` are places in `spaces` and `HOWS`.
+    The others as in `Sample` and its `Reading`; `space` and `how` are places in `spaces` and `HOWS`. `told`: None where
+    each value is its `raw`.
     """
 
     order: Times
     time: Times
     device: Numbers
     frame: Times
-    space: Codes
+    space: Codes | Names
     address: Numbers
-    raw: Numbers
+    raw: Bits
     how: Codes
     spaces: tuple[str, ...] = ("",)
+    told: ToldValues | None = None
 
     def __len__(self) -> int:
         return len(self.order)
 
     def take(self, which: Masks | Times) -> PlainSamples:
         """Some of them."""
-        return replace(self, **{one.name: getattr(self, one.name)[which] for one in fields(self)[:-1]})
+        columns: dict[str, Any] = {one.name: getattr(self, one.name)[which] for one in fields(self)[:-2]}
+        return replace(self, **columns, told=self.told.take(which) if self.told is not None else None)
+
+    @property
+    def number(self) -> npt.NDArray[Any]:
+        """What each is."""
+        return self.raw if self.told is None else self.told.number
+
+    def values(self) -> Iterable[int | float]:
+        """The same one by one, whole numbers as such."""
+        return self.raw.tolist() if self.told is None else self.told.numbers()
+
+    def words(self) -> Iterable[str]:
+        """In the protocol's own words, where it has some."""
+        told = self.told
+        return ("",) * len(self) if told is None else (told.phrases[at] for at in told.words.tolist())
+
+    def _parts_and_stations(self) -> tuple[Iterable[str], Iterable[int | None]]:
+        told = self.told
+        if told is None:
+            return ("",) * len(self), (None,) * len(self)
+        return (told.parts[at] for at in told.part.tolist()), told.station.tolist()
 
     def points(self) -> tuple[list[Key], Times]:
         """The points that there are, and of which each sample is."""
-        whole = (self.device.astype(np.int64) + 1) << 24 | self.space.astype(np.int64) << 16 | self.address
+        whole = (self.device.astype(np.int64) + 1) << 48 | self.space.astype(np.int64) << 32 | self.address
         distinct, which = np.unique(whole, return_inverse=True)
+        parts: tuple[str, ...] = ("",)
+        part_of = [0] * len(distinct)
+        if self.told is not None and len(self.told.parts) > 1:
+            parts = self.told.parts
+            both, which = np.unique(which.astype(np.int64) * len(parts) + self.told.part, return_inverse=True)
+            distinct, part_of = distinct[both // len(parts)], (both % len(parts)).tolist()
         keys = [
             (
-                station_name((one >> 24) - 1 if one >> 24 else None),
-                plain_name(self.spaces[one >> 16 & 0xFF], one & 0xFFFF),
+                station_name((one >> 48) - 1 if one >> 48 else None),
+                point_name(self.spaces[one >> 32 & 0xFFFF], one & 0xFFFF_FFFF, parts[part]),
             )
-            for one in distinct.tolist()
+            for one, part in zip(distinct.tolist(), part_of, strict=True)
         ]
         return keys, which.astype(np.int64)
 
     def samples(self) -> Iterator[Sample]:
         """All as objects."""
-        columns = (self.time, self.device, self.frame, self.space, self.address, self.raw, self.how)
-        for time, device, frame, space, address, raw, how in zip(*(one.tolist() for one in columns), strict=True):
-            reading = Reading(self.spaces[space], address, raw, raw, HOWS[how])
-            value = Value(plain_name(reading.space, address), raw, raw, "", Quality.GOOD, reading)
+        numbers = (self.time, self.device, self.frame, self.space, self.address, self.raw, self.how)
+        columns = zip(*(one.tolist() for one in numbers), strict=True)
+        told = zip(self.values(), self.words(), *self._parts_and_stations(), strict=True)
+        for (time, device, frame, space, address, raw, how), (number, words, part, station) in zip(
+            columns, told, strict=True
+        ):
+            reading = Reading(self.spaces[space], address, raw, number, HOWS[how], part, station=station, words=words)
+            name = point_name(reading.space, address, part)
+            value = Value(name, number, raw, "", Quality.GOOD, reading, words=words)
             yield Sample(time, None if device == NONE else device, value, frame)
 
 
@@ -101,12 +140,23 @@ class TableSamples:
 
 def add_to(table: PointTable, samples: TableSamples) -> None:
     """Give a table of points the samples that follow; the same as one after the other."""
+    for one in by_point(samples):
+        if isinstance(one, PointRun):
+            one.add_to(table)
+        else:
+            table.add([one])
+
+
+def by_point(samples: TableSamples) -> Iterator[PointRun | Sample]:
+    """All samples of a point at once, in the place of the first, where they are many and all of them plain; others one
+    by one, those of a point in their order."""
     plain = samples.plain
     keys, which = plain.points()
     one_by_one = [((order, at), sample) for at, (order, sample) in enumerate(samples.others)]
     both = {(sample.station, sample.name) for _, sample in samples.others}
-    mixed = np.array([key in both for key in keys], bool)
-    if mixed.any():  # a point of which there are both
+    mixed = np.array([key in both for key in keys], bool)  # a point of which there are both
+    mixed |= np.bincount(which, minlength=len(keys)) < MANY
+    if mixed.any():
         places = np.flatnonzero(mixed[which])
         orders = zip(plain.order[places].tolist(), places.tolist(), strict=True)
         one_by_one += zip(orders, plain.take(places).samples(), strict=True)
@@ -115,41 +165,46 @@ def add_to(table: PointTable, samples: TableSamples) -> None:
     at = 0
     for run in sorted(runs, key=lambda run: run.begin):
         while at < len(one_by_one) and one_by_one[at][0] < run.begin:
-            table.add([one_by_one[at][1]])
+            yield one_by_one[at][1]
             at += 1
-        run.add_to(table, plain)
-    table.add([sample for _, sample in one_by_one[at:]])
+        yield run
+    for _, sample in one_by_one[at:]:
+        yield sample
 
 
 @dataclass(frozen=True, slots=True)
-class _Run:
+class PointRun:
     """All samples of one point. `places`: of each in the columns; `begin`: of the first, its exchange before it."""
 
     key: Key
     begin: tuple[int, int]
     places: Times
+    plain: PlainSamples
 
-    def add_to(self, table: PointTable, plain: PlainSamples) -> None:
+    def numbers(self) -> Iterator[tuple[int, float]]:
+        """Times, ns, and values."""
+        places, plain = self.places, self.plain
+        return zip(plain.time[places].tolist(), plain.number[places].astype(float).tolist(), strict=True)
+
+    def add_to(self, table: PointTable) -> None:
         """Give a table of points all of them."""
-        places = self.places
-        raws = plain.raw[places]
-        changes = np.flatnonzero(raws[1:] != raws[:-1])
+        places, plain = self.places, self.plain
+        numbers = plain.number[places]
+        changes = np.flatnonzero(numbers[1:] != numbers[:-1])
         changed = int(plain.time[places[changes[-1] + 1]]) if len(changes) else None
         last = next(plain.take(places[-1:]).samples())
-        newest = places[-HISTORY:]
-        history = list(zip(plain.time[newest].tolist(), plain.raw[newest].astype(float).tolist(), strict=True))
-        times = plain.time[places]
-        first = int(raws[0]), int(times[0])
+        first = next(iter(plain.take(places[:1]).values())), int(plain.time[places[0]])
+        history = list(replace(self, places=places[-HISTORY:]).numbers())
         every = Histogram()
-        every.add_many(np.diff(times))
+        every.add_many(np.diff(plain.time[places]))
         written = int(np.count_nonzero(plain.how[places] == _WRITE))
-        seen = SampleRun(len(places), every, float(raws.min()), float(raws.max()), written)
+        seen = SampleRun(len(places), every, float(numbers.min()), float(numbers.max()), written)
         table.add_run(self.key, last, first, changed, history, seen)
 
 
-def _runs(plain: PlainSamples, keys: Sequence[Key], which: Times) -> Iterator[_Run]:
+def _runs(plain: PlainSamples, keys: Sequence[Key], which: Times) -> Iterator[PointRun]:
     order = np.argsort(which, kind="stable")
     ends = np.cumsum(np.bincount(which, minlength=len(keys)))
     for number, key in enumerate(keys):
         places = order[ends[number - 1] if number else 0 : ends[number]]
-        yield _Run(key, (int(plain.order[places[0]]), int(places[0])), places)
+        yield PointRun(key, (int(plain.order[places[0]]), int(places[0])), places, plain)

@@ -234,7 +234,7 @@ def _together(plain: PlainSamples, words: Sequence[tuple[int, Sample]]) -> Plain
     both = {name: np.concatenate([getattr(plain, name), values]) for name, values in columns.items()}
     in_order = np.argsort(both["order"], kind="stable")
     sorted_ones: dict[str, Any] = {name: values[in_order].astype(np.int64) for name, values in both.items()}
-    return replace(plain, **sorted_ones, spaces=spaces)
+    return replace(plain, **sorted_ones, spaces=spaces, told=None)
 
 
 def covering(blocks: Iterable[RegisterStretch]) -> list[RegisterStretch]:

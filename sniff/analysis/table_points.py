@@ -1,7 +1,7 @@
 """Values taken out of tables: `PointReader` for many exchanges at once. Pure.
 
-Which exchanges tell something is asked of columns. Those of stations without a profile that are plain registers stay
-columns; only for the others the two frames become objects.
+Which exchanges tell something is asked of columns. Those of stations without a profile that are numbers and nothing
+else stay columns; only for the others the two frames become objects.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dissectors.columns import NONE, VERDICTS, Masks, Times
+from dissectors.columns import NONE, VERDICTS, Masks, Numbers, Times
 from dissectors.frame import Frame
 from dissectors.reading_columns import HOWS, ReadingColumns
 from dissectors.readings import Origin
@@ -80,26 +80,30 @@ class _Work:
         late = closed.verdict == _LATE
         tells = request.there & (_ALONE[closed.verdict] | (response.there & _WHOLE[closed.verdict]))
         answered = response.there & ~_ALONE[closed.verdict]
-        by_columns = tells & request.plain & (response.plain | ~answered) & self._without_profile()
+        by_columns = tells & request.plain & (response.plain | ~answered) & self._without_profile(self._station())
         done, plain = self._plain(np.flatnonzero(by_columns), answered)
         places = np.flatnonzero((tells & ~done) | late)
         others = self._others(places, late)
         self._carry()
         return TableSamples(plain, others)
 
-    def _without_profile(self) -> Masks:
-        """Transactions whose station has no profile."""
-        closed, devices = self._table.transactions, self._reader.devices
-        stations = np.where(closed.verdict == _BROADCAST, NONE, closed.station)
+    def _station(self) -> Numbers:
+        """Of the transactions."""
+        closed = self._table.transactions
+        return np.where(closed.verdict == _BROADCAST, NONE, closed.station).astype(np.int32)
+
+    def _without_profile(self, stations: Numbers) -> Masks:
+        """Which of the stations have no profile."""
         distinct, which = np.unique(stations, return_inverse=True)
-        free = np.array([devices.at(None if one == NONE else one) is None for one in distinct.tolist()], bool)
+        at = self._reader.devices.at
+        free = np.array([at(None if one == NONE else one) is None for one in distinct.tolist()], bool)
         without: Masks = free[which] if len(which) else np.zeros(0, bool)
         return without
 
     def _plain(self, chosen: Times, answered: Masks) -> tuple[Masks, PlainSamples]:
         """Of the transactions at these places: which are done by columns, and what they tell."""
-        table, closed = self._table, self._table.transactions
-        done = np.zeros(len(closed), bool)
+        table = self._table
+        done = np.zeros(len(table.transactions), bool)
         make = self._reader.dissector.reading_columns
         if make is None or not len(chosen):
             return done, no_samples()
@@ -108,20 +112,26 @@ class _Work:
         read: ReadingColumns = make(
             table.frames.take(asked_at), table.frames.take(answered_at), has_answer, table.octets
         )
+        station = self._station()[chosen[read.exchange]]
+        if read.told is not None:
+            described = np.zeros(len(chosen), bool)
+            described[read.exchange[~self._without_profile(read.told.station)]] = True
+            read = read.without(described)
+            station = read.told.station if read.told is not None else station
         done[chosen[read.done]] = True
         of = read.exchange
         carrier = np.where((read.how == _READ) | (read.how == _REPORT), answered_at[of], asked_at[of])
-        station = np.where(closed.verdict == _BROADCAST, NONE, closed.station)[chosen[of]]
         return done, PlainSamples(
             chosen[of],
             table.frames.end[answered_at[of]],
-            station.astype(np.int32),
+            station,
             carrier + table.first,
             read.space,
             read.address,
             read.raw,
             read.how,
             read.spaces,
+            read.told,
         )
 
     def _others(self, places: Times, late: Masks) -> list[tuple[int, Sample]]:

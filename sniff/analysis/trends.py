@@ -6,9 +6,11 @@ described the numbers that they are guessed to be.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
@@ -21,6 +23,7 @@ from sniff.analysis.register_kinds import GuessSureness, Use
 from sniff.analysis.register_series import WORD_SPACES, RegisterSeries, covering
 
 if TYPE_CHECKING:
+    from sniff.analysis.point_columns import PlainSamples
     from sniff.engine.engine import Output
     from sniff.engine.session import LineEvent
     from sniff.engine.table import Table
@@ -80,14 +83,17 @@ class Trends:
 
     def add_table(self, table: Table) -> None:
         """Take many at once; the same as one after the other."""
-        from sniff.analysis.point_columns import TableSamples, no_samples
+        from sniff.analysis.point_columns import PointRun, TableSamples, by_point
         from sniff.analysis.table_points import samples_of
 
         samples = samples_of(self._reader, table)
         undescribed = [one for one in samples.others if self._is_undescribed(one[1])]
         self._series.add_samples(TableSamples(samples.plain, undescribed))
-        for sample in TableSamples(no_samples(), samples.others).in_order():
-            self._take(sample)
+        for one in by_point(TableSamples(_named_ones(samples.plain), samples.others)):
+            if isinstance(one, PointRun):
+                self._add(one.key, "", one.numbers())
+            else:
+                self._take(one)
 
     def add_line_event(self, event: LineEvent) -> None:
         """It says nothing of a value."""
@@ -111,13 +117,16 @@ class Trends:
             or self._is_undescribed(sample)
         ):
             return
-        key = sample.station, sample.name
+        self._add((sample.station, sample.name), value.unit, [(sample.time, float(value.value))])
+
+    def _add(self, key: Key, unit: str, numbers: Iterable[tuple[int, float]]) -> None:
         trend = self._trends.get(key)
         if trend is None:
             if len(self._trends) >= MOST_POINTS:
                 return
-            trend = self._trends[key] = Trend(*key, value.unit)
-        trend.add(sample.time, float(value.value))
+            trend = self._trends[key] = Trend(*key, unit)
+        for time, number in numbers:
+            trend.add(time, number)
 
     def _guesses(self) -> Iterator[Trend]:
         blocks = covering(self._series.blocks())
@@ -134,3 +143,12 @@ class Trends:
                     values,
                     len(seen),
                 )
+
+
+def _named_ones(plain: PlainSamples) -> PlainSamples:
+    """Numbers of things that name themselves; without those that the protocol has words for."""
+    of_table = np.array([space in _TABLES for space in plain.spaces], bool)
+    named = ~of_table[plain.space]
+    if plain.told is not None:
+        named &= np.array([not words for words in plain.told.phrases], bool)[plain.told.words]
+    return plain.take(named)
