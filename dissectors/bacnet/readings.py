@@ -18,7 +18,7 @@ from dissectors.frame import Frame
 from dissectors.readings import Origin, Reading
 
 PRESENT_VALUE = 85
-_READ, _READ_MULTIPLE, _WRITE, _WRITE_MULTIPLE = 12, 14, 15, 16
+READ_PROPERTY, _READ_MULTIPLE, WRITE_PROPERTY, _WRITE_MULTIPLE = 12, 14, 15, 16
 _CONFIRMED_COV, _UNCONFIRMED_COV = 1, 2
 
 
@@ -30,14 +30,14 @@ def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ..
     if asked is None or asked.apdu is None:
         return ()
     if response is None:
-        return tuple(_told(asked))
+        return tuple(told(asked))
     answer = messages.read(response) if response.ok else None
     if answer is None or answer.apdu is None:
         return ()
     if answer.apdu.type == PduType.SIMPLE_ACK:
-        return tuple(_told(asked))
+        return tuple(told(asked))
     if answer.apdu.type == PduType.COMPLEX_ACK:
-        return tuple(_told(answer))
+        return tuple(told(answer))
     return ()
 
 
@@ -48,7 +48,7 @@ def asks(frame: Frame) -> tuple[Reading, ...]:
     if message is None or spoken is None or spoken[0].type != PduType.CONFIRMED_REQUEST:
         return ()
     apdu, parameters = spoken
-    if apdu.service not in (_READ, _READ_MULTIPLE):
+    if apdu.service not in (READ_PROPERTY, _READ_MULTIPLE):
         return ()
     decoded = messages.decode_parameters(apdu, parameters)
     if decoded is None or decoded.error is not None:
@@ -74,7 +74,7 @@ def _part_of(record: ConstructedValue, index: int | None) -> str:
     return "" if which.value == PRESENT_VALUE else str(which) + (f".{index}" if index is not None else "")
 
 
-def _told(message: Message) -> Iterator[Reading]:
+def told(message: Message) -> Iterator[Reading]:
     """What one frame tells by itself; total: a parameter that is not there ends it."""
     spoken = message.spoken()
     if spoken is None:
@@ -86,7 +86,7 @@ def _told(message: Message) -> Iterator[Reading]:
     decoded = messages.decode_parameters(apdu, parameters)
     if decoded is None or decoded.error is not None:
         return
-    whose = message.destination if apdu.service in (_WRITE, _WRITE_MULTIPLE) else message.source
+    whose = message.destination if apdu.service in (WRITE_PROPERTY, _WRITE_MULTIPLE) else message.source
     try:
         for thing, record, value, how in tell(decoded.record):
             for index, part in _parts(record, value):
@@ -127,13 +127,16 @@ def _change(record: ConstructedValue) -> Iterator[Item]:
 
 
 _TELLERS: dict[tuple[int, int], Any] = {
-    (PduType.COMPLEX_ACK, _READ): _property(Origin.READ),
+    (PduType.COMPLEX_ACK, READ_PROPERTY): _property(Origin.READ),
     (PduType.COMPLEX_ACK, _READ_MULTIPLE): _read_multiple,
-    (PduType.CONFIRMED_REQUEST, _WRITE): _property(Origin.WRITE),
+    (PduType.CONFIRMED_REQUEST, WRITE_PROPERTY): _property(Origin.WRITE),
     (PduType.CONFIRMED_REQUEST, _WRITE_MULTIPLE): _write_multiple,
     (PduType.CONFIRMED_REQUEST, _CONFIRMED_COV): _change,
     (PduType.UNCONFIRMED_REQUEST, _UNCONFIRMED_COV): _change,
 }
+
+TELLING = frozenset(_TELLERS)
+"""What may tell something: (PDU type, service)."""
 
 
 _ARRAYS = frozenset(
@@ -178,7 +181,7 @@ def _shown(value: Any) -> tuple[int | None, int | float | str | None]:
     if isinstance(value, Double):
         return int.from_bytes(struct.pack(">d", value), "big"), float(value)
     if isinstance(value, float):
-        return int.from_bytes(struct.pack(">f", value), "big"), _shortest(value)
+        return int.from_bytes(struct.pack(">f", value), "big"), shortest(value)
     if isinstance(value, str):
         return None, value
     if isinstance(value, BitString | ObjectId | Date | Time):
@@ -195,7 +198,7 @@ def _words(value: Any, shown: int | float | str) -> str:
     return shown if isinstance(shown, str) and not isinstance(value, str) else ""
 
 
-def _shortest(value: float) -> float:
+def shortest(value: float) -> float:
     """The shortest decimal that means the same single: 59.9 and not 59.9000015."""
     for digits in (6, 7, 8):
         rounded = float(f"{value:.{digits}g}")
