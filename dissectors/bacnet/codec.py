@@ -109,6 +109,14 @@ class _Scope:
         if self.names is not None:
             self.names.tags.setdefault(tag.start, text)
 
+    def name_part(self, tag: Tag, field: LayoutField, value: Any) -> None:
+        if self.names is not None:  # a text for each value is dear
+            self.name(tag, _named(field, value))
+
+    def name_value(self, tag: Tag, value: Any) -> None:
+        if self.names is not None:
+            self.name(tag, f"{VALUE_ONLY}{show(value)}")
+
     def note(self, field: LayoutField, value: Any) -> None:
         if isinstance(value, ObjectId) and field.name != "initiating-device-identifier":
             self.object = value
@@ -198,14 +206,14 @@ def _field(field: LayoutField, tags: Sequence[Tag], at: int, scope: _Scope, dept
     if field.tag is None:
         value, after = _in_place(field.type, tags, at, scope, depth)
         if base(field.type) is not None:
-            scope.name(tags[at], _named(field, value))
+            scope.name_part(tags[at], field, value)
         return value, after
     tag = tags[at]
     if base(field.type) is not None:
         if tag.children is not None:
             raise _Misfit(f"{field.name} is no primitive value")
         value = _primitive(field.type, tag)
-        scope.name(tag, _named(field, value))
+        scope.name_part(tag, field, value)
         return value, at + 1
     if tag.children is None:
         raise _Misfit(f"{field.name} has no opening tag")
@@ -232,7 +240,7 @@ def _in_place(type_name: str, tags: Sequence[Tag], at: int, scope: _Scope, depth
             if after == at:
                 raise _Misfit(f"{item} has no tags")
             if base(item) is not None:
-                scope.name(tags[at], f"{VALUE_ONLY}{show(value)}")
+                scope.name_value(tags[at], value)
             values.append(value)
             at = after
         return tuple(values), at
@@ -288,7 +296,7 @@ def _any(tags: Sequence[Tag], scope: _Scope, depth: int) -> Any:
         try:
             value, used = _in_place(expected, tags, 0, scope.of_value(), depth + 1)
             if len(tags) == 1 and base(expected) is not None:
-                scope.name(tags[0], f"{VALUE_ONLY}{show(value)}")
+                scope.name_value(tags[0], value)
             if used == len(tags) and (used or expected.startswith("{")):
                 return value
         except _Misfit:
