@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import selectors
-import signal
 import subprocess
 import time
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
 
 from dissectors.line import LineSettings
 from sniff.capture.config import CaptureConfig, RecordSpec, SourceSpec
+from sniff.capture.ending import awaited_exit_code, exit_code, in_words
 from sniff.capture.ipc import (
     LOSSY,
     Batch,
@@ -21,6 +22,7 @@ from sniff.capture.ipc import (
     IpcKind,
     Message,
     MessageSplitter,
+    Status,
     decode_json,
     decode_message,
     encode,
@@ -55,6 +57,17 @@ dropped and counted."""
 GOODBYE = 1.0
 """Seconds for a process that has said its last words, and once more when it was killed: a sync may hold it."""
 
+NOTHING_HEARD = 3.0
+"""Seconds without a word, of which there is one a second, after which it is looked whether the process is there."""
+
+NOTHING_SAID = 10.0
+"""Seconds after which somebody is told: an overloaded machine may let it wait for some."""
+
+SILENT = "the capture process does not answer"
+
+END_PATIENCE = 2.0
+"""Seconds that a process whose connection is closed gets to end."""
+
 DERIVED_BACKLOG = 1024 * 1024
 
 
@@ -79,6 +92,7 @@ class CaptureLink:
         self._gap: dict[int, int] = {}  # bus → octets dropped since the last read that was kept
         self._heard_at = time.monotonic()
         self._stops = 0
+        self._reported: dict[int, Status] = {}  # the newest of each bus
         self._told_to_end = 0  # how hard
         self._malformed: IpcError | None = None
         self.closing = False
@@ -170,10 +184,14 @@ class CaptureLink:
                 message = decode_message(*self._pop())
                 if message is not None:
                     messages.append(message)
+                if isinstance(message, Status):
+                    self._reported[message.bus] = message
                 if isinstance(message, Ended):
                     return self._finish(messages, message)
         except IpcError as malformed:
             return self._finish(messages, self._broken(malformed))
+        if not messages and self._silent >= NOTHING_SAID:
+            messages += self._say_silent()
         if not alive and not self._waiting:
             error = self._malformed
             return self._finish(messages, self._how_it_ended() if error is None else self._broken(error))
@@ -190,6 +208,17 @@ class CaptureLink:
         self.closing = self.closing or not alive
         return alive
 
+    @property
+    def _silent(self) -> float:
+        """Seconds since anything came."""
+        return time.monotonic() - self._heard_at
+
+    def _say_silent(self) -> list[Batch]:
+        """Once, what stands for the reports that do not come; the next one that does takes it back."""
+        silent = [replace(status, error=SILENT) for status in self._reported.values() if status.error != SILENT]
+        self._reported.update((status.bus, status) for status in silent)
+        return [*silent]
+
     def _broken(self, error: IpcError) -> Ended:
         self._kill()
         return Ended(f"capture process: {error}", clean=False)
@@ -205,7 +234,7 @@ class CaptureLink:
         with selectors.DefaultSelector() as selector:
             selector.register(self._connection, selectors.EVENT_READ)
             if not selector.select(max(0, timeout)):
-                return True
+                return self._silent < NOTHING_HEARD or exit_code(self._process) is None
         self._heard_at = time.monotonic()
         taken = 0
         while taken < READ_AT_ONCE:
@@ -315,8 +344,7 @@ class CaptureLink:
 
         How it ended, then; None as long as there is hope. What it had not written is lost.
         """
-        silent = time.monotonic() - self._heard_at
-        if self.ended is not None or not self._stops or silent < patience:
+        if self.ended is not None or not self._stops or self._silent < patience:
             return None
         if not self._told_to_end:
             self._told_to_end = 1
@@ -366,26 +394,15 @@ class CaptureLink:
 
     def _how_it_ended(self) -> Ended:
         """Why nothing comes any more. One that ended as asked may find this side too slow for its last words."""
-        try:
-            code: int | None = self._process.wait(2)
-        except subprocess.TimeoutExpired:
-            code = None
+        code = awaited_exit_code(self._process, END_PATIENCE)
         if code in (0, LOSSY):
             lost = "; not everything was recorded" if code else ""
             return Ended(f"ended, but its last words did not arrive{lost}", lossy=bool(code), unheard=True)
         return Ended(self._why_dead(), clean=False)
 
     def _why_dead(self) -> str:
-        try:
-            code: int | None = self._process.wait(2)
-        except subprocess.TimeoutExpired:
-            code = None
         said = b""
         if not self._errors.closed:
             self._errors.seek(0)
             said = self._errors.read()[-2000:]
-        last = said.decode("utf-8", "replace").strip().splitlines()[-1:]
-        if code is None:
-            return "capture process does not answer"
-        how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
-        return f"capture process {how}" + "".join(f": {line}" for line in last)
+        return in_words(awaited_exit_code(self._process, END_PATIENCE), said)
