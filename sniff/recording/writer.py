@@ -319,7 +319,7 @@ class Recorder:
         self._flush_number += 1
         if len(self._flushes) < MOST_FLUSHES:
             self._flushes.append((self._flush_number, self._oldest_came))
-        self._keeper.orders.put(Flush(self._flush_number, self._bus))
+        self._keeper.orders.put(Flush(self._flush_number, self._bus, now if self._ticked is None else self._ticked))
         self._oldest = None
         if self._unsynced is None:
             self._unsynced = now

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,6 +17,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import BinaryIO
 
+from dissectors.line import NS_PER_S
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Session
 from sniff.formats.files import explain
@@ -30,8 +30,8 @@ from sniff.recording.topics import LINE, RAW
 MOST_WAITING = 32 << 20
 """Octets kept in memory for a disk that is slow or full: 45 min at 115200 Bd."""
 
-RELEASE_AFTER = 30.0
-"""Seconds that results of the engine are kept back, so that many are packed together."""
+RELEASE_AFTER = 120 * NS_PER_S
+"""ns that results of the engine are kept back, so that many are packed together."""
 
 MOVED, REMOVED = "moved away", "removed"
 """What somebody can do to a file that is being written."""
@@ -65,12 +65,13 @@ class WriterCommand:
 
 
 class Flush(WriterCommand):
-    """Write everything out; the flushes that a bus asks for are numbered from 1."""
+    """Write everything out; the flushes that a bus asks for are numbered from 1. `now`: ns on the capture's clock."""
 
-    def __init__(self, number: int, bus: int = 0) -> None:
+    def __init__(self, number: int, bus: int, now: int) -> None:
         super().__init__("flush")
         self.number = number
         self.bus = bus
+        self.now = now
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +155,7 @@ class Keeper:
         self._finished_size = 0
         self._count = self._number = 0  # of parts begun; of the newest, as its name has it
         self._began: int | None = None  # time of the part's first batch
-        self._released = time.monotonic()
+        self._released: int | None = None  # when results were written last, ns on the capture's clock
         self._syncer = Syncer()
         try:
             self._open()
@@ -249,9 +250,10 @@ class Keeper:
         return self._rotation.due(self._part.size, age, reads)
 
     def _flush(self, flush: Flush) -> None:
-        now = time.monotonic()
-        if self._part.holds_enough or now - self._released >= RELEASE_AFTER:
-            self._released = now
+        if self._released is None:
+            self._released = flush.now
+        if self._part.holds_enough or not 0 <= flush.now - self._released < RELEASE_AFTER:
+            self._released = flush.now
             self._part.release()
         self._part.flush()
         self._written()

@@ -435,28 +435,3 @@ def test_rotation_is_read(text: str, rotation: Rotation) -> None:
 def test_rotation_that_is_none(text: str, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         Rotation.parse(text)
-
-
-def test_results_are_packed_together_and_octets_are_not_kept_back(tmp_path: Path) -> None:
-    from mcap.reader import make_reader
-
-    recorder = Recorder(tmp_path / "a.mcap", SESSION)
-    now = BASE
-    for number in range(100):
-        now += S // 10
-        recorder.chunk(Chunk(now, b"1234"))
-        recorder.derived("/bus/b", "sniff485.Bus", now, now, b'{"load": 0.%03d}' % number)
-        recorder.tick(now)
-    eventually(lambda: recorder._keeper.orders.empty(), "the thread is stuck")
-    assert len(list(capture(recorder.path).items())) >= 90
-    assert list(capture(recorder.path).messages("/bus")) == []
-    recorder.close()
-    assert len(list(capture(recorder.path).messages("/bus"))) == 100
-    with recorder.path.open("rb") as stream:
-        summary = make_reader(stream).get_summary()
-        assert summary is not None
-        raw = next(id for id, channel in summary.channels.items() if channel.topic == "/raw")
-        of_results = [index for index in summary.chunk_indexes if raw not in index.message_index_offsets]
-        assert len(of_results) == 1
-        assert sum(1 for _ in make_reader(stream).iter_messages(topics=["/raw"])) == len(summary.chunk_indexes) - 1
-    assert capture(recorder.path).completeness().whole
