@@ -78,10 +78,11 @@ class Status:
 
     `path`: the file being written, "" for none; `size`: its octets. `octets`: all that came from the line. `dropped`:
     octets that were recorded but not sent here, because this side did not keep up. `lost`: octets that are missing
-    from the file, because the disk did not keep up. `priority`: what the system granted. `error`: why nothing is
-    written any more, "" while all is well. `behind`: seconds by which the disk is late, 0 while it keeps up.
-    `unwritten`: octets that are not in the file yet. `closing`: whether nothing is heard any more, and the rest is
-    being written. `omitted`: octets that no trigger asked for, which were not kept.
+    from the file, because the disk did not keep up; `taken_away`: those of them that were in a file that somebody
+    removed or cut. `priority`: what the system granted. `error`: why nothing is written any more, "" while all is well.
+    `behind`: seconds by which the disk is late, 0 while it keeps up. `unwritten`: octets that are not in the file yet.
+    `closing`: whether nothing is heard any more, and the rest is being written. `omitted`: octets that no trigger asked
+    for, which were not kept.
     """
 
     bus: int
@@ -96,6 +97,7 @@ class Status:
     unwritten: int = 0
     closing: bool = False
     omitted: int = 0
+    taken_away: int = 0
 
 
 LOSSY = 3

@@ -182,6 +182,8 @@ class CaptureLoop:
             if recorder.finished:
                 recorder.synced(max(0.0, until - time.monotonic()))
         for bus in self._buses:
+            for text in bus.recorder.notices if bus.recorder is not None else ():  # of the last look at the file
+                self.outlet.item(bus.index, LineEvent(bus.source.now(), LineEventKind.NOTE, text))
             self.outlet.post(encode_status(self.status(bus.index)))
         return LOSSY if any(recorder.trouble or recorder.lost_octets for recorder in self.recorders) else 0
 
@@ -335,6 +337,7 @@ class CaptureLoop:
             recorder.unwritten,
             self.closing,
             0 if ring is None else ring.omitted,
+            recorder.taken_away,
         )
 
     # -- what the main process says ----------------------------------------------------------------------------

@@ -14,6 +14,7 @@ from sniff.analysis.sanitizing import sanitized
 from sniff.bus.live import LiveBus
 from sniff.bus.router import Router
 from sniff.capture.config import RecordSpec, SourceSpec
+from sniff.capture.ipc import Status
 from sniff.capture.link import CaptureLink
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, Failure, searching
 from sniff.cli.interruption import until_interrupted
@@ -225,13 +226,21 @@ def say_recorded(live: LiveBus, where: bool = True, bus: str = "") -> None:
         lost += status.unwritten
         print(f"sniff485: {bus}about {lost} octets NOT RECORDED: the capture process was ended", file=sys.stderr)
     elif lost:
-        why = "" if status.error else ": the disk did not keep up"
+        why = "" if status.error else _why_lost(status)
         print(f"sniff485: {bus}{lost} octets NOT RECORDED{why}", file=sys.stderr)
     if live.file_is_gone:
         print(f"sniff485: {sanitized(status.path or live.link.paths[0])} is not there any more", file=sys.stderr)
     elif status.path and where:
         cut = "" if ended is None or ended.clean else ", cut where the capture was ended"
         print(f"sniff485: recorded to {sanitized(status.path)}{cut}", file=sys.stderr)
+
+
+def _why_lost(status: Status) -> str:
+    """Where octets went that were heard and are in no file."""
+    if status.taken_away < status.lost:
+        too = f", and {status.taken_away} of them were in files that were taken away" if status.taken_away else ""
+        return f": the disk did not keep up{too}"
+    return ": they were in files that were taken away"
 
 
 class _Meter:

@@ -269,6 +269,11 @@ class Recorder:
         return self._dropped_octets + self._share.lost_octets + (self.unwritten if self._given_up else 0)
 
     @property
+    def taken_away(self) -> int:
+        """Those of them that were in a file that somebody removed or cut."""
+        return self._share.taken_away
+
+    @property
     def unwritten(self) -> int:
         """Octets of the bus that are not in a file yet."""
         return max(0, self.octets - self._dropped_octets - self._share.lost_octets - self._share.confirmed)

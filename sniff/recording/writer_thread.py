@@ -33,7 +33,7 @@ MOST_WAITING = 32 << 20
 RELEASE_AFTER = 120 * NS_PER_S
 """ns that results of the engine are kept back, so that many are packed together."""
 
-MOVED, REMOVED = "moved away", "removed"
+MOVED, REMOVED, CUT = "moved away", "removed", "cut short"
 """What somebody can do to a file that is being written."""
 
 MOST_DERIVED = MOST_WAITING // 4
@@ -87,7 +87,8 @@ class Share:
     """What the keeper did for one bus.
 
     `taken`: weight of its parcels that came through `orders`. `flushed`: number of the newest of its flushes after
-    which nothing waited. `confirmed`, `lost_octets`: octets of the bus that are in a file, and that never will be.
+    which nothing waited. `confirmed`, `lost_octets`: octets of the bus that are in a file, and that never will be;
+    `taken_away`: those of the latter that were in a file that somebody removed or cut.
     `notices`: what became of files, in words, for whoever takes them from there. `next`: number of the next entry of
     its reads; `first`: the same at the begin of the part. `octets`, `part_octets`: of the bus, in all parts and in
     this one; `unwritten`: those that were taken since everything was in the file.
@@ -103,6 +104,7 @@ class Share:
     octets: int = 0
     part_octets: int = 0
     unwritten: int = 0
+    taken_away: int = 0
 
     def written(self) -> None:
         """All that was taken is in the file."""
@@ -118,6 +120,7 @@ class Share:
         """Octets that a part had of it are in no file any more."""
         self.confirmed -= octets - self.unwritten
         self.lost_octets += octets - self.unwritten
+        self.taken_away += octets - self.unwritten
 
 
 SYNC, CHECK, CLOSE = WriterCommand("sync"), WriterCommand("check"), WriterCommand("close")
@@ -321,7 +324,7 @@ class Keeper:
         try:
             ours = os.fstat(self._part.stream.fileno())
             if os.path.samestat(os.stat(self._start / self.paths[-1]), ours):
-                return None
+                return CUT if ours.st_size < self._part.size - self._part.waiting else None
         except (FileNotFoundError, NotADirectoryError):
             pass
         except (OSError, ValueError):
@@ -334,8 +337,9 @@ class Keeper:
             self._part.finish()
             self._written()
         finally:
-            self.gone = self._fate() is not None
-            if self._fate() == REMOVED:
+            fate = self._fate()
+            self.gone = fate is not None
+            if fate in (REMOVED, CUT):
                 for share in self.shares:
                     share.forget(share.part_octets)
             for share in self.shares:

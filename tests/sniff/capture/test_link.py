@@ -16,6 +16,7 @@ from sniff.capture.link import CaptureLink
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.sources import PortError
+from tests.e2e.recording_bus import octets_of
 
 LINE = LineSettings.parse("19200,8E1")
 
@@ -251,6 +252,20 @@ def test_results_find_their_way_into_the_file(pty, tmp_path) -> None:
     assert results == [("/bus/bus", 2_000, b'{"load": 0.5}')]
     assert not link.derived(0, "/bus/bus", "sniff485.Bus", 2_000, 1_000, b"{}")
     assert link.derived_dropped == 1
+
+
+def test_a_file_that_is_removed_at_the_very_end_is_told(pty, tmp_path) -> None:
+    path = tmp_path / "a.mcap"
+    with CaptureLink.start([SourceSpec(pty.path, LINE)], RecordSpec(str(path))) as link:
+        pty.feed(b"gone")
+        while not octets_of(path):
+            link.receive(0.1)
+        path.unlink()
+        messages = link.stop()
+    notes = [one.item.text for one in messages if isinstance(one, ReceivedMessage) and isinstance(one.item, LineEvent)]
+    assert any("was removed while it was recorded" in note for note in notes)
+    status = [one for one in messages if isinstance(one, Status)][-1]
+    assert status.taken_away == status.lost == 4
 
 
 def test_a_clock_step_is_told(monkeypatch) -> None:

@@ -258,6 +258,22 @@ def test_a_file_that_is_removed(running: Running, tmp_path: Path) -> None:
     assert read(recorder.path).completeness().whole
 
 
+def test_a_file_that_is_cut_under_way(running: Running, tmp_path: Path) -> None:
+    """`> a.mcap`, or a rotation of logs: what follows would stand behind a hole that nobody can read."""
+    recorder = running.recorder
+    running.run(3)
+    eventually(lambda: recorder._keeper.orders.empty(), "the thread is stuck")
+    os.truncate(recorder.path, 0)
+    said = until_noticed(running)
+    assert said.startswith(f"{tmp_path / 'a.mcap'} was cut short while it was recorded, with ")
+    running.run(3)
+    recorder.close()
+    found = chunks_of(tmp_path / "a-0002.mcap")
+    assert found == running.given[-len(found) :]
+    assert 11 * len(found) + recorder.lost_octets == recorder.octets
+    assert recorder.taken_away == recorder.lost_octets > 0
+
+
 def test_a_file_that_is_moved_is_finished_where_it_is(running: Running, tmp_path: Path) -> None:
     recorder = running.recorder
     running.run(3)
