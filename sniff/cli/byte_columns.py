@@ -20,6 +20,7 @@ from sniff.cli.standard_streams import ESCAPE
 Bytes = npt.NDArray[np.uint8]
 Codes = npt.NDArray[np.integer[Any]]
 
+_ALL_64 = (1 << 64) - 1
 _AT_ONCE = 4096
 """Lines put together at a time: they stay in the processor's cache."""
 
@@ -97,7 +98,12 @@ def width(column: Column) -> int:
     return int((column.texts if isinstance(column, Chosen) else column).shape[1])
 
 
-def digits(values: Times, least: int = 0) -> Bytes:
+def since(times: Times, begin: int) -> npt.NDArray[np.uint64]:
+    """How long after the begin (ns) each time is, at least 0; between the ends of int64 lies twice what it holds."""
+    return np.where(times > begin, times.astype(np.uint64) - np.uint64(begin & _ALL_64), np.uint64(0))
+
+
+def digits(values: Times | npt.NDArray[np.uint64], least: int = 0) -> Bytes:
     """Whole numbers, 0 or more, in decimal; to the right of spaces in a field of `least` places."""
     if not len(values):
         return np.zeros((0, max(least, 1)), np.uint8)
@@ -124,7 +130,7 @@ def digits(values: Times, least: int = 0) -> Bytes:
     return octets
 
 
-def fixed_digits(values: Times, places: int) -> Bytes:
+def fixed_digits(values: Times | npt.NDArray[np.uint64], places: int) -> Bytes:
     """Whole numbers below 10 ** `places` with zeros in front."""
     groups = -(-places // 4)
     out = np.empty((len(values), groups), np.uint32)

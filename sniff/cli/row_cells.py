@@ -26,6 +26,7 @@ from sniff.cli.byte_columns import (
     hex_octets,
     matrix,
     pieced,
+    since,
     where,
 )
 from sniff.cli.distinct import distinct_codes
@@ -171,7 +172,7 @@ class RowCells:
         """ns since the capture's start."""
         frames = some.settled.table.frames
         times = (frames.start if name == "start_ns" else frames.end)[some.places]
-        return [digits(np.maximum(times - self._session.started, 0))]
+        return [digits(since(times, self._session.started))]
 
     def tx(self, some: _Some, _: str) -> list[Column]:
         """Numbers of transactions."""

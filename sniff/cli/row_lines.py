@@ -12,15 +12,15 @@ from dissectors.tracker import Interval
 from dissectors.words import milliseconds
 from sniff.analysis.wording import duration
 from sniff.bus import row_words as rows
-from sniff.cli.byte_columns import Chosen, Codes, Column, digits, encoded, fixed_digits, pieced
+from sniff.cli.byte_columns import Chosen, Codes, Column, digits, encoded, fixed_digits, pieced, since
 from sniff.cli.distinct import distinct_codes
 from sniff.cli.merged_columns import merged
 from sniff.cli.said_texts import SaidTexts
 from sniff.engine.column_join import SettledRows
 from sniff.engine.session import Session
 
-_US = 1000
-_EXACT = 1 << 52
+_US, _HALF = np.uint64(1000), np.uint64(500)
+_EXACT = np.uint64(1 << 52)
 """ns up to which a float of seconds rounds to microseconds as the number does, ties apart."""
 
 
@@ -38,17 +38,18 @@ class RowLines:
         """The lines of rows at some places, in parts."""
         table = settled.table
         texts, notes, alone = self._texts.column(table, places)
-        since = np.maximum(table.frames.start[places] - self._session.started, 0)
-        micros = (since + _US // 2) // _US
-        alone |= (since % _US == _US // 2) | (since >= _EXACT)
+        passed = since(table.frames.start[places], self._session.started)
+        rest = passed % _US
+        micros = passed // _US + (rest > _HALF)
+        alone |= (rest == _HALF) | (passed >= _EXACT)
         which = settled.which[places - settled.begin]
         bad, told = self._told.of(settled, np.where(_is_last(settled, places, which), which, -1))
         noted = self._texts.notes
         bad |= np.array([trouble for trouble, _ in noted] or [False], bool)[notes]
         columns: list[Column] = [
             *([Chosen.of([b"", b"\x1b[31m"], bad.view(np.uint8))] if self._colour else []),
-            digits(places + table.first, 6), b" ", digits(micros // 1_000_000, 5), b".",
-            fixed_digits(micros % 1_000_000, 6), b" s  ", Chosen.of([b"  ", b"! "], bad.view(np.uint8)),
+            digits(places + table.first, 6), b" ", digits(micros // _US // _US, 5), b".",
+            fixed_digits(micros % (_US * _US), 6), b" s  ", Chosen.of([b"  ", b"! "], bad.view(np.uint8)),
             texts, self._noted(notes, told, [note for _, note in noted]),
             *([Chosen.of([b"\n", b"\x1b[0m\n"], bad.view(np.uint8))] if self._colour else [b"\n"]),
         ]  # fmt: skip

@@ -8,6 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from dissectors.frame import Chunk
+from dissectors.line import LineSettings
+from sniff.engine.session import Session
+from sniff.recording.writer import Recorder
+
 
 @pytest.fixture
 def foreign(tmp_path: Path) -> Path:
@@ -23,6 +28,20 @@ def test_the_first_read_began_before_its_stamp(foreign: Path, sniff485: Callable
     assert 0 < second["start_ns"] < second["end_ns"]
     assert second["end_ns"] == 890_000_000
     assert "-0." not in sniff485("show", foreign).out
+
+
+def test_between_the_ends_of_what_a_file_can_say(tmp_path: Path, sniff485: Callable) -> None:
+    """584 years, twice what int64 holds in ns: as text and as JSON, many rows at a time as one by one."""
+    path = tmp_path / "a.mcap"
+    session = Session("a", LineSettings.parse("19200,8E1"), "modbus-rtu", -(1 << 63), "a")
+    recorder = Recorder(path, session)
+    for time in (-(1 << 63), 500, (1 << 63) - 1):
+        recorder.chunk(Chunk(time, bytes.fromhex("010300000002c40b")))
+    recorder.close()
+    for how in ((), ("--json",), ("-T", "fields", "-e", "start_ns")):
+        quick, slow = (sniff485("show", path, *how, *more) for more in ((), ("--reference",)))
+        assert (quick.code, quick.out) == (0, slow.out)
+    assert "18446744073.70" in sniff485("show", path).out
 
 
 def test_stats_without_stations_says_so(tmp_path: Path, sniff485: Callable) -> None:
