@@ -178,6 +178,8 @@ def telling(lives: Sequence[LiveBus], told: Telling | None) -> Iterator[Telling 
     if told is None:
         yield None
         return
+    from sniff.outlets.outlet import close_all
+
     for live in lives:
         told.attach(live)
     for outlet in told.outlets:
@@ -187,8 +189,7 @@ def telling(lives: Sequence[LiveBus], told: Telling | None) -> Iterator[Telling 
     try:
         yield told
     finally:
-        for outlet in told.outlets:
-            outlet.close()
+        close_all(told.outlets)
         if told.server is not None:
             told.server.close()
         _say_end(told)

@@ -10,6 +10,7 @@ import importlib.util
 import json
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
@@ -17,7 +18,7 @@ from sniff.bus.derived_topics import DerivedMessage
 from sniff.bus.value_topics import ValueChannels, ValueMessage
 from sniff.capture.spawn import environment
 from sniff.outlet_settings import ListenSettings, SettingsError
-from sniff.outlets.outlet import Outlet
+from sniff.outlets.outlet import AT_THE_END, Outlet
 from sniff.outlets.told import LogTold, NumbersTold, Told, ToldBus, ValueTold
 from sniff.recording.topics import SCHEMAS
 
@@ -25,9 +26,6 @@ MOST_CHANNELS = 20_000
 TAKEN_AT_ONCE = 256
 EVERY = 0.0
 """Seconds between two values of a point: each is told, as a plot wants it."""
-
-AT_THE_END = 5.0
-"""Seconds for the process to end by itself."""
 
 
 class FoxgloveOutlet(Outlet):
@@ -66,8 +64,9 @@ class FoxgloveOutlet(Outlet):
         port: int = said["port"]
         return port
 
-    def close(self, patience: float = 2.0) -> None:
+    def close(self, patience: float = AT_THE_END) -> None:
         """End the process, too."""
+        until = time.monotonic() + patience
         super().close(patience)
         if self._thread.is_alive():
             self._process.kill()  # it takes nothing in
@@ -75,7 +74,7 @@ class FoxgloveOutlet(Outlet):
             with contextlib.suppress(OSError):
                 self._process.stdin.close()
         try:
-            self._process.wait(AT_THE_END)
+            self._process.wait(max(0.0, until - time.monotonic()))
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 from sniff.analysis.sanitizing import sanitized
 from sniff.outlet_settings import MqttSettings, SettingsError
 from sniff.outlets.mqtt_messages import OFFLINE, ONLINE, Messages, Publication
-from sniff.outlets.outlet import Outlet
+from sniff.outlets.outlet import AT_THE_END, Outlet
 
 if TYPE_CHECKING:
     from aiomqtt import Client
@@ -69,7 +69,7 @@ class MqttOutlet(Outlet):
             with contextlib.suppress(RuntimeError):  # closed meanwhile
                 loop.call_soon_threadsafe(self._news.set)
 
-    def close(self, patience: float = 5.0) -> None:
+    def close(self, patience: float = AT_THE_END) -> None:
         """Deliver what waits, as far as the broker takes it."""
         super().close(patience)
         self.dropped += sum(self._unsent.values()) + len(self._events)

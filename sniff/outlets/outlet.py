@@ -8,6 +8,7 @@ end neither.
 from __future__ import annotations
 
 import threading
+import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -17,8 +18,8 @@ from sniff.outlets.told import Told
 MOST_WAITING = 8192
 """Things told that wait for an outlet; a busy bus tells some hundred a second."""
 
-AT_THE_END = 2.0
-"""Seconds that an outlet gets for what still waits when everything is over."""
+AT_THE_END = 1.5
+"""Seconds that outlets get, all together, for what still waits when everything is over."""
 
 
 class Outlet(ABC):
@@ -57,12 +58,16 @@ class Outlet(ABC):
             self._condition.notify()
         self._wake()
 
-    def close(self, patience: float = AT_THE_END) -> None:
-        """Deliver what waits, for so many seconds at most; the rest is dropped, and counted."""
+    def finish(self) -> None:
+        """Nothing more will be told: what waits is delivered meanwhile. Does not wait for it; `close` does."""
         with self._condition:
             self._closing = True
             self._condition.notify()
         self._wake()
+
+    def close(self, patience: float = AT_THE_END) -> None:
+        """Deliver what waits, for so many seconds at most; the rest is dropped, and counted."""
+        self.finish()
         self._thread.join(patience)
         with self._condition:
             self.dropped += len(self._told)
@@ -105,3 +110,12 @@ class Outlet(ABC):
     @abstractmethod
     def _run(self) -> None:
         """The thread: take and deliver until `closing` and nothing waits."""
+
+
+def close_all(outlets: Sequence[Outlet], patience: float = AT_THE_END) -> None:
+    """Close them at the same time: one that hangs takes nothing from the others, and all of them no longer than one."""
+    until = time.monotonic() + patience
+    for outlet in outlets:
+        outlet.finish()
+    for outlet in outlets:
+        outlet.close(max(0.0, until - time.monotonic()))

@@ -11,7 +11,7 @@ import pytest
 
 from sniff.outlet_settings import FileSettings, SettingsError
 from sniff.outlets import json_lines
-from sniff.outlets.outlet import Outlet
+from sniff.outlets.outlet import AT_THE_END, Outlet, close_all
 from sniff.outlets.stream import StreamOutlet
 from tests.sniff.outlets.given import KeptOutlet, finding, numbers, state, value
 
@@ -35,6 +35,21 @@ def test_its_end_is_not_waited_for() -> None:
     outlet.close(0.0)
     assert outlet.dropped >= 49
     outlet.go.set()
+
+
+def test_several_that_hang_take_no_longer_than_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 0.0
+
+    class Hanging(KeptOutlet):
+        def close(self, patience: float = AT_THE_END) -> None:
+            nonlocal now
+            assert all(one.closing for one in outlets), "they end at the same time"
+            now += patience
+
+    monkeypatch.setattr("sniff.outlets.outlet.time.monotonic", lambda: now)
+    outlets = [Hanging() for _ in range(3)]
+    close_all(outlets)
+    assert now == AT_THE_END
 
 
 def test_one_that_breaks_is_said_and_breaks_nothing() -> None:
