@@ -9,7 +9,7 @@ import sys
 
 from dissectors import registry
 from sniff.capture.config import RecordSpec, SourceSpec
-from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments, listening, outlets, targets
+from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments, listening, outlets, standard_streams, targets
 from sniff.cli.live import show
 
 DEFAULT_DURATION = 10.0
@@ -55,7 +55,8 @@ def run(args: argparse.Namespace) -> int:
             live = listening.start(source, record, duration, devices)
             bus.begin()  # with the sniffer listening, so that the first words of the bus are heard
             return show([live], args.json, args.lines, told_to)
-    except BrokenPipeError:  # whoever read our output went away
-        raise
     except (BusFailed, OSError) as error:
+        output = isinstance(error, OSError) and error.filename == standard_streams.OUTPUT
+        if output or isinstance(error, BrokenPipeError):  # nothing of the bus: whoever takes our output
+            raise
         raise Failure(f"demo: no virtual bus here: {error}", PORT_TROUBLE) from None

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from sniff.engine.capture import Capture, CaptureError
 from sniff.formats import read
+from sniff.formats.files import open_capture
 from sniff.formats.mark_file import unmarked
 from sniff.formats.several_buses import buses_in
 from sniff.formats.table import suffixes
@@ -136,11 +137,11 @@ def is_being_written(file: FileState, now: int) -> bool:
     if not file.path.lower().endswith(".mcap") or now - file.changed > STILL_WRITTEN:
         return False
     try:
-        with open(file.path, "rb") as stream:
+        with open_capture(Path(file.path)) as stream:
             begins = stream.read(len(scan.MAGIC)) == scan.MAGIC
             stream.seek(max(0, file.size - len(scan.MAGIC)))
             return begins and stream.read() != scan.MAGIC
-    except OSError:
+    except (CaptureError, OSError):
         return False
 
 

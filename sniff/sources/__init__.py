@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import os
 import re
-from pathlib import Path
 from typing import Protocol
 
 from dissectors.line import LineSettings
@@ -77,7 +77,7 @@ def open_source(spec: str, line: LineSettings, clock: Clock | None = None) -> So
         return GrowingRecordingSource(spec.removeprefix(SCHEME), clock)
     from sniff.formats.table import suffixes
 
-    if Path(spec).is_file() or spec.lower().endswith(suffixes()):
+    if os.path.isfile(spec) or spec.lower().endswith(suffixes()):
         from sniff.sources.capture_file import CaptureFileSource
 
         return CaptureFileSource(spec, clock)

@@ -9,6 +9,7 @@ from dissectors.line import LineSettings
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session
 from sniff.formats import read
+from sniff.formats.files import explain
 from sniff.formats.table import suffixes
 from sniff.sources import PortError
 from sniff.sources.clock import Clock
@@ -33,7 +34,8 @@ class CaptureFileSource:
             self._next = next(self._items, None)
         except (CaptureError, OSError) as error:
             named = path.lower().endswith(suffixes())
-            raise PortError(str(error) if named else f"{path}: a file, not a serial port; {error}") from error
+            said = explain(path, error) if isinstance(error, OSError) else error
+            raise PortError(str(said) if named else f"{path}: a file, not a serial port; {said}") from error
         self.session: Session = capture.session
         self._clock = clock
         self._speed = speed

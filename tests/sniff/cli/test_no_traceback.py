@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
@@ -12,7 +13,8 @@ import pytest
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.bus.capture_writer import create
-from sniff.cli import main
+from sniff.cli import demo, main
+from sniff.cli.standard_streams import OUTPUT
 from sniff.engine.session import Session
 
 CAPTURE = """#!sniff-capture 1
@@ -82,6 +84,27 @@ def test_times_at_the_ends(folder: Path, capsys: pytest.CaptureFixture[str], tim
         code, said = ended(capsys, command, "ends.mcap")
         assert code in (0, 1, 2), said
         assert "internal error" not in said
+
+
+def test_a_full_output_is_no_fault_of_a_virtual_bus(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device", OUTPUT)
+
+    pytest.importorskip("termios")
+    monkeypatch.setattr(demo.listening, "start", lambda *_: None)
+    monkeypatch.setattr(demo, "show", full)
+    code, said = ended(capsys, "demo", "--lines", "--duration", "1")
+    assert (code, said.splitlines()[-1]) == (
+        3, "sniff485: standard output: no space left on the disk; make room, or write elsewhere",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("suffix", ["", ".mcap"])
+def test_a_port_of_a_name_that_is_too_long(folder: Path, capsys: pytest.CaptureFixture[str], suffix: str) -> None:
+    code, said = ended(capsys, "record", f"./{LONG}{suffix}", "-s", "9600,8N1", "-w", "x.mcap")
+    assert (code, said.count("\n"), "Errno" in said) == (4, 1, False)
 
 
 def test_what_nobody_foresaw(folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
