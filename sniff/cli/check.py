@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Severity
+from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.site_ear import SiteEar
 from sniff.bus.live import LiveItem
 from sniff.bus.model import BusModel
@@ -148,7 +149,7 @@ def _listen(port: str, args: argparse.Namespace) -> Checked:
     args.port = port
     target = targets.target_of(args)
     duration = args.duration or DEFAULT_DURATION
-    print(f"sniff485: listening to {port} for {duration:g} s", file=sys.stderr)
+    print(f"sniff485: listening to {sanitized(port)} for {duration:g} s", file=sys.stderr)
     live = listening.start(target.source, None, None, target.devices, target.search)
     with until_interrupted() as caught:
         early = _found_first(live, caught)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import sys
 import textwrap
@@ -15,6 +14,7 @@ from xml.sax.saxutils import escape, quoteattr
 from dissectors.findings import Finding, Rule, Severity, merged, times, under_causes
 from dissectors.line import NS_PER_S
 from sniff.analysis.health import Health
+from sniff.analysis.json_text import dumps
 from sniff.analysis.judging import rules_over
 from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.site_findings import SiteBus, judged
@@ -226,7 +226,7 @@ def write_json(checked: Sequence[Checked]) -> None:
     """Print one object a finding, consequences behind their cause; keys and their order are a promise."""
     for one in checked:
         for finding, _ in under_causes(one.findings):
-            print(json.dumps(to_json(one, finding), ensure_ascii=False))
+            print(dumps(to_json(one, finding)))
 
 
 def to_json(one: Checked, finding: Finding) -> dict[str, object]:
@@ -312,8 +312,5 @@ def _attribute(text: str) -> str:
 
 
 def _clean(text: str) -> str:
-    """Without characters that XML 1.0 does not allow."""
-    return "".join(
-        c if c in "\t\n" or (c >= " " and not 0xD800 <= ord(c) <= 0xDFFF and c not in "\ufffe\uffff") else "?"
-        for c in text
-    )
+    """Without characters that XML 1.0 does not allow, or that a terminal obeys."""
+    return "\n".join(map(sanitized, text.split("\n")))

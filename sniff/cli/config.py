@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, fields
 from typing import Any
 
+from sniff.analysis.sanitizing import sanitized
 from sniff.cli import USAGE, Failure, json_output
 from sniff.config import FILE, Config, ConfigError, load
 from sniff.outlet_settings import FileSettings, ListenSettings, MqttSettings, Secret
@@ -37,10 +38,10 @@ def run(args: argparse.Namespace) -> int:
         if args.json:
             print(json_output.dumps({"bus": bus.name, **values, "from": dict(bus.origin)}))
             continue
-        print(f"[bus.{bus.name}]")
+        print(f"[bus.{sanitized(bus.name)}]")
         for key, value in values.items():
             if value is not None:
-                print(f"  {key} = {value!r}  # {bus.origin.get(key, config.path)}")
+                print(f"  {key} = {value!r}  # {sanitized(bus.origin.get(key, config.path))}")
     for section, values in _sections(config):
         if not values:
             continue
@@ -49,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
             continue
         print(f"[{section}]")
         for key, value in values.items():
-            print(f"  {key} = {value!r}  # {config.path}")
+            print(f"  {key} = {value!r}  # {sanitized(config.path)}")
     return 0
 
 

@@ -118,7 +118,7 @@ def write(port: str, outcome: Outcome, also: str = "", open_with: str = "live") 
     for words in outcome.cannot_tell:
         print(f"  cannot tell {words}")
     if open_with == "live":
-        print(f"  next: sniff485 live {port} -s {reading.line} -p {reading.protocol}")
+        print(f"  next: sniff485 live {sanitized(port)} -s {reading.line} -p {reading.protocol}")
     else:
         print(f"  next: sniff485 {open_with} {sanitized(port)} -p {reading.protocol}")
 

@@ -149,7 +149,7 @@ class Printer:
 
     def _say(self, text: str) -> None:
         self.before_saying()
-        print(f"sniff485: {self.live.session.port}: {sanitized(text)}", file=sys.stderr)
+        print(f"sniff485: {sanitized(self.live.session.port)}: {sanitized(text)}", file=sys.stderr)
 
 
 def waiting_words(status: Status) -> str:

@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     writing.write(args, session, capture, [args.file])
     complete = capture.completeness()
     said = "was whole" if complete.whole else complete.text
-    print(f"sniff485: {args.file}: {sanitized(said)}", file=sys.stderr)
+    print(f"sniff485: {sanitized(args.file)}: {sanitized(said)}", file=sys.stderr)
     return 0
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 import textwrap
 
 from dissectors.findings import Rule
+from sniff.analysis.json_text import dumps
 from sniff.analysis.judging import all_rules
 from sniff.cli import USAGE, Failure, tables
 
@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
             raise Failure(f"{missing[0]}: no rule has that code or prefix; `sniff485 rule` lists them", USAGE)
     if args.json:
         for rule in chosen.values():
-            print(json.dumps(to_json(rule), ensure_ascii=False))
+            print(dumps(to_json(rule)))
     elif not args.codes:
         tables.write(("code", "severity", "title"), [(r.code, r.severity.label, r.title) for r in chosen.values()])
     else:

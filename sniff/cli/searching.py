@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from dissectors import registry
 from dissectors.line import LineSettings
 from sniff.analysis.autodetect import Detecting, Ending, Outcome, candidates
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.autodetect import Search, SearchProgress
 from sniff.bus.live import LiveBus
 from sniff.capture.link import CaptureLink
@@ -107,6 +108,6 @@ class Meter:
 
 def say_found(port: str, outcome: Outcome) -> None:
     """Say on standard error what a search came to, and what it cannot tell."""
-    print(f"sniff485: {port}: {sentence(outcome)}", file=sys.stderr)
+    print(f"sniff485: {sanitized(port)}: {sentence(outcome)}", file=sys.stderr)
     for words in outcome.cannot_tell:
         print(f"sniff485: cannot tell {words}", file=sys.stderr)

@@ -20,6 +20,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from sniff.analysis.sanitizing import sanitized
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, targets
 from sniff.formats.table import suffixes
 from sniff.outlet_settings import TOKEN_ENV, Secret, SettingsError
@@ -64,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
         return _serve(args, access, [os.path.abspath(args.source)])
     with _recorded(args) as path:
         code = _serve(args, access, ["--follow", path])
-    print(f"sniff485: recorded to {path}", file=sys.stderr)
+    print(f"sniff485: recorded to {sanitized(path)}", file=sys.stderr)
     return code
 
 
@@ -102,7 +103,8 @@ def _serve(args: argparse.Namespace, access: object, shown: list[str]) -> int:
     def ready(port: int) -> None:
         host = f"[{args.host}]" if ":" in args.host else args.host
         secret = "/?token=…" if access.token else "/"
-        print(f"sniff485: showing {args.source} at http://{host}:{port}{secret}; Ctrl-C ends it", file=sys.stderr)
+        shown = f"{sanitized(args.source)} at http://{host}:{port}{secret}"
+        print(f"sniff485: showing {shown}; Ctrl-C ends it", file=sys.stderr)
 
     if args.allow_remote:
         os.environ[GUEST] = "1"

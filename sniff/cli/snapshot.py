@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
             expected = place.read_text(encoding="utf-8") if place.exists() else ""
             if not args.check and expected != found:
                 place.write_text(found, encoding="utf-8")
-                print(f"{place}: written")
+                print(f"{sanitized(place)}: written")
         except OSError as error:
             raise Failure(f"{place}: {error.strerror}", UNREADABLE) from None
         except CaptureError as error:
