@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 from dissectors.findings import counted
 from dissectors.profiles import Devices
@@ -16,7 +17,7 @@ from sniff.bus.router import Router
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.ipc import Status
 from sniff.capture.link import CaptureLink
-from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, Failure, searching
+from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, Failure, searching, standard_streams
 from sniff.cli.interruption import until_interrupted
 from sniff.cli.printing import Printer
 from sniff.cli.searching import Unknowns
@@ -97,22 +98,50 @@ def run(printers: Sequence[Printer], progress: bool = True) -> int:
         for printer in printers:
             printer.before_saying = meter.clear
     search_meters = {live.bus: searching.Meter() for live in lives if progress and live.searching is not None}
-    heeded = 0
     with until_interrupted() as caught, _stopped_by_its_reader(lives[0]):
-        while any(live.ended is None for live in lives):
-            for number, printer in enumerate(printers):
-                _turn(printer, 0.0 if number else 0.1, search_meters)
-            if meter is not None and not search_meters:
-                meter.show()
-            if len(caught) > heeded:
-                heeded = len(caught)
-                lives[0].end()
-        for printer in printers:
-            printer.finish()
+        ending = _Ending(lives[0], caught)
+        with standard_streams.abandoned_once(ending.is_asked_for):
+            while any(live.ended is None for live in lives):
+                for number, printer in enumerate(printers):
+                    _without_waiting_for_its_reader(partial(_turn, printer, 0.0 if number else 0.1, search_meters))
+                if meter is not None and not search_meters:
+                    meter.show()
+                ending.heed()
+            for printer in printers:
+                _without_waiting_for_its_reader(printer.finish)
     for shown in (meter, *search_meters.values()):
         if shown is not None:
             shown.clear()
     return max(_code(live, bool(caught)) for live in lives)
+
+
+class _Ending:
+    """Signals, and what they ask of a capture: its end, and again no patience with the disk."""
+
+    def __init__(self, live: LiveBus, caught: list[int]) -> None:
+        self._live, self._caught = live, caught
+        self._heeded = 0
+
+    def heed(self) -> None:
+        """Hand on what came since."""
+        if len(self._caught) > self._heeded:
+            self._heeded = len(self._caught)
+            self._live.end()
+
+    def is_asked_for(self) -> bool:
+        """Whether it is over, as far as can be seen by somebody who waits for something else."""
+        self.heed()
+        self._live.link.look()
+        return bool(self._heeded) or self._live.link.closing
+
+
+def _without_waiting_for_its_reader(step: Callable[[], None]) -> None:
+    """Do what prints; from where nobody takes it any more it is printed to nowhere."""
+    try:
+        step()
+    except standard_streams.NotTaken as error:
+        standard_streams.give_output_up()
+        standard_streams.say(f"{error.filename}: {error.strerror}; what came last is not in it")
 
 
 def _turn(printer: Printer, timeout: float, search_meters: dict[int, searching.Meter]) -> None:

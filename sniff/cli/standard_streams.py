@@ -8,16 +8,21 @@ import errno
 import io
 import json
 import os
+import select
 import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable, Iterator
 
     from _typeshed import ReadableBuffer as Buffer
 
 ESCAPE = "sniff485.escape"
 OUTPUT = "standard output"
+
+LOOK_EVERY = 0.1
+TAKES_NOTHING_FOR = 1.0
+"""Seconds between looks whether it takes something, and for which it may take nothing once all is over."""
 
 
 def prepare() -> None:
@@ -75,6 +80,21 @@ def output_error() -> OSError | None:
     return None
 
 
+class NotTaken(OSError):
+    """Whoever reads standard output does not, and nobody waits for it any longer."""
+
+
+@contextlib.contextmanager
+def abandoned_once(over: Callable[[], bool]) -> Iterator[None]:
+    """Meanwhile a reader that takes nothing (a pager) is waited for until it is `over`, which is asked some times a
+    second, and a second more; then NotTaken is raised. Else a signal would wait as long as the reader likes."""
+    _Output.over = staticmethod(over)
+    try:
+        yield
+    finally:
+        _Output.over = None
+
+
 def give_output_up() -> None:
     """Print to nowhere from here on: what the interpreter still holds is written when it ends."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
@@ -91,13 +111,30 @@ def _hold_descriptors() -> None:
 
 
 class _Output(io.FileIO):
-    """Standard output whose errors say that they are of it."""
+    """Standard output whose errors say that they are of it. `over`: as `abandoned_once` has it."""
+
+    over: Callable[[], bool] | None = None
 
     def write(self, octets: Buffer) -> int:
         try:
+            if self.over is not None and hasattr(select, "poll"):
+                self._wait(self.over)
+                octets = memoryview(octets)[: select.PIPE_BUF]  # so much is taken without waiting
             return super().write(octets) or 0
+        except NotTaken:
+            raise
         except OSError as error:
             raise OSError(error.errno, error.strerror, OUTPUT) from None
+
+    def _wait(self, over: Callable[[], bool]) -> None:
+        """Until something is taken. Raises NotTaken."""
+        reader = select.poll()
+        reader.register(self.fileno(), select.POLLOUT)
+        left = TAKES_NOTHING_FOR
+        while not reader.poll(LOOK_EVERY * 1000):
+            left -= LOOK_EVERY * over()
+            if left <= 0:
+                raise NotTaken(errno.ETIMEDOUT, "nobody takes what is printed", OUTPUT)
 
 
 class _Closed(io.RawIOBase):

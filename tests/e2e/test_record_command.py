@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import signal
 import socket
 import subprocess
 import sys
+import termios
 import threading
 import time
 import tty
@@ -297,6 +299,28 @@ def test_its_reader_going_away_ends_it(begin, bus, tmp_path) -> None:
     assert POLL.hex() in frame
     process.stdout.close()
     assert process.wait(20) == 0
+    assert read(tmp_path / "x.mcap").completeness().whole
+
+
+def test_a_reader_that_takes_nothing_keeps_nobody_from_ending(begin, tmp_path) -> None:
+    """`live --json | less`: what it does not take is given up, the recording is whole."""
+    busy = Bus(tmp_path / "busy", lambda: POLL * 8, 0.002)
+    try:
+        process = begin("live", str(busy.link), "-s", "115200,8N1", "--json", "-w", "x.mcap")
+        waiting = bytearray(4)
+
+        def is_full() -> bool:
+            fcntl.ioctl(process.stdout, termios.FIONREAD, waiting)
+            return int.from_bytes(waiting, sys.byteorder) > 60_000
+
+        wait_until(is_full, "nothing is printed")
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60) == 0
+    finally:
+        busy.unplug()
+    errors = process.stderr.read()
+    assert "standard output: nobody takes what is printed" in errors
+    assert "recorded to x.mcap" in errors
     assert read(tmp_path / "x.mcap").completeness().whole
 
 
