@@ -234,7 +234,10 @@ class CaptureLink:
         with selectors.DefaultSelector() as selector:
             selector.register(self._connection, selectors.EVENT_READ)
             if not selector.select(max(0, timeout)):
-                return self._silent < NOTHING_HEARD or exit_code(self._process) is None
+                if self._silent < NOTHING_HEARD:
+                    return True
+                if not selector.select(0):  # one that was stopped meanwhile gives nothing, whatever has come
+                    return exit_code(self._process) is None
         self._heard_at = time.monotonic()
         taken = 0
         while taken < READ_AT_ONCE:

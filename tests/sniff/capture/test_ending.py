@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import selectors
 import socket
 import subprocess
 import sys
@@ -70,6 +71,24 @@ def test_silence_is_said_once_and_taken_back(link_to) -> None:
     assert link.receive(1) == [Status(0, "x.mcap")]
     assert exit_code(process) is None
     assert awaited_exit_code(process, 0.0) is None
+
+
+def test_what_came_while_this_side_was_stopped_is_no_silence(link_to, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A `select` that a stop has interrupted gives nothing once its time is over."""
+    link, _ = link_to(ALIVE)
+    waits = []
+
+    class Interrupted(selectors.DefaultSelector):
+        def select(self, timeout: float | None = None) -> list:
+            waits.append(timeout)
+            return super().select(timeout) if len(waits) > 1 else []
+
+    link_to.theirs.sendall(encode_status(Status(0, "x.mcap")))
+    monkeypatch.setattr(link_module.selectors, "DefaultSelector", Interrupted)
+    link._reported[0] = Status(0, "older")
+    monkeypatch.setattr(link_module, "NOTHING_SAID", 5.0)
+    link._heard_at -= 60.0
+    assert link.receive(0.1) == [Status(0, "x.mcap")]
 
 
 def test_how_it_ended_in_words() -> None:
