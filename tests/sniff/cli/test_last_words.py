@@ -14,7 +14,7 @@ from sniff.cli.listening import say_recorded
 
 @pytest.mark.parametrize("code", [0, 3])
 def test_an_end_that_did_not_arrive_says_that_octets_went_with_it(code: int) -> None:
-    link: Any = SimpleNamespace(_process=SimpleNamespace(wait=lambda timeout: code))
+    link: Any = SimpleNamespace(_process=SimpleNamespace(poll=lambda: code))
     ended = CaptureLink._how_it_ended(link)
     assert ended.unheard
     assert ended.lossy == bool(code)
