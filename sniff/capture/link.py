@@ -7,7 +7,7 @@ import selectors
 import subprocess
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from dissectors.line import LineSettings
@@ -41,6 +41,10 @@ from sniff.sources import PortError
 from sniff.sources.clock import Clock
 
 START_PATIENCE = 30.0
+LEFT_TO_GREET = 2.0
+"""Seconds for a process that is beginning when it is not wanted any more: it may be about to listen, and then ends in
+good order."""
+
 STOP_PATIENCE = 10.0
 READ_SIZE = 64 * 1024
 GIVEN_AT_ONCE = 128 * 1024
@@ -116,24 +120,26 @@ class CaptureLink:
         duration: float | None = None,
         count: int | None = None,
         watched: bool = True,
+        is_given_up: Callable[[], bool] = lambda: False,
     ) -> CaptureLink:
         """Start listening; returns when all ports are open and all files begun.
 
         `duration`: seconds, `count`: frames after which it ends, whatever becomes of this process; None for no end.
-        `watched`: as `CaptureConfig` has it. Raises PortError or CaptureError with the reason.
+        `watched`: as `CaptureConfig` has it. `is_given_up`: whether somebody wants no capture any more; one that has
+        not begun soon after that is ended. Raises PortError or CaptureError with the reason, KeyboardInterrupt then.
         """
         limit = None if duration is None else int(duration * 1e9)
         config = CaptureConfig(tuple(sources), record, limit, count, watched)
         words = [source.spec for source in config.sources] + ([config.record.path] if config.record else [])
         link = cls(spawn(words))
         try:
-            link._greet(config)
+            link._greet(config, is_given_up)
         except BaseException:
             link._kill()
             raise
         return link
 
-    def _greet(self, config: CaptureConfig) -> None:
+    def _greet(self, config: CaptureConfig, is_given_up: Callable[[], bool]) -> None:
         self._connection.setblocking(True)
         try:
             self._connection.sendall(encode_json(IpcKind.CONFIG, config.to_json()))
@@ -141,9 +147,16 @@ class CaptureLink:
             raise PortError(self._why_dead()) from error
         self._connection.setblocking(False)
         until = time.monotonic() + START_PATIENCE
+        given_up = False
         while not self._waiting:
-            alive = self._fill(until - time.monotonic())
-            if not self._waiting and (not alive or time.monotonic() > until):  # it may say why, and end at once
+            alive = self._fill(min(0.1, until - time.monotonic()))
+            if self._waiting:
+                break
+            if not given_up and is_given_up():
+                given_up, until = True, min(until, time.monotonic() + LEFT_TO_GREET)
+            if not alive or time.monotonic() > until:  # it may say why, and end at once
+                if given_up:
+                    raise KeyboardInterrupt
                 raise PortError(self._why_dead())
         kind, _, body = self._pop()
         value = decode_json(body)

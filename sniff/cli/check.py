@@ -150,8 +150,8 @@ def _listen(port: str, args: argparse.Namespace) -> Checked:
     target = targets.target_of(args)
     duration = args.duration or DEFAULT_DURATION
     print(f"sniff485: listening to {sanitized(port)} for {duration:g} s", file=sys.stderr)
-    live = listening.start(target.source, None, None, target.devices, target.search)
     with until_interrupted() as caught:
+        live = listening.start(target.source, None, None, target.devices, target.search)
         early = _found_first(live, caught)
         run_of = Checking(live.model)
         observe(_heard(early), run_of)

@@ -18,7 +18,7 @@ from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.ipc import Status
 from sniff.capture.link import CaptureLink
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, Failure, searching, standard_streams
-from sniff.cli.interruption import until_interrupted
+from sniff.cli.interruption import is_interrupted, until_interrupted
 from sniff.cli.printing import Printer
 from sniff.cli.searching import Unknowns
 from sniff.cli.targets import Target
@@ -79,7 +79,7 @@ def start_link(
 ) -> CaptureLink:
     """Start the capture process without an engine. Ends with exit code 4 for the port, 3 for the file."""
     try:
-        return CaptureLink.start(sources, record, duration, count, watched)
+        return CaptureLink.start(sources, record, duration, count, watched, is_interrupted)
     except PortError as error:
         raise Failure(str(error), PORT_TROUBLE) from None
     except CaptureError as error:

@@ -6,6 +6,7 @@ folder unless --no-record; says the file's name at the end. Where output is no t
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,6 +17,7 @@ from sniff.bus.live import LiveBus
 from sniff.capture.config import RecordSpec
 from sniff.capture.ipc import Status
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, listening, outlets, printing, targets
+from sniff.cli.interruption import until_interrupted
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -51,10 +53,12 @@ def run(args: argparse.Namespace) -> int:
     if args.all:  # one that is not there yet is waited for; one that was named must be there
         buses = [replace(one, source=replace(one.source, patient=True)) for one in buses]
     told_to = outlets.prepare(outlets.settings_of(args), [outlets.Printed()] if args.json else ())
-    lives = listening.start_all(buses, RecordSpec(path) if path else None, args.duration)
-    if path and not args.ports:
-        print(f"sniff485: recording to {sanitized(path)}", file=sys.stderr)
-    return show(lives, args.json, args.lines, told_to)
+    has_screen = not args.json and not args.lines and arguments.on_terminal()  # which has signals of its own
+    with contextlib.nullcontext() if has_screen else until_interrupted():
+        lives = listening.start_all(buses, RecordSpec(path) if path else None, args.duration)
+        if path and not args.ports:
+            print(f"sniff485: recording to {sanitized(path)}", file=sys.stderr)
+        return show(lives, args.json, args.lines, told_to)
 
 
 def show(lives: Sequence[LiveBus], as_json: bool, as_lines: bool, told_to: outlets.Telling | None) -> int:

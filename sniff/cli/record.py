@@ -9,6 +9,7 @@ import argparse
 
 from sniff.capture.config import RecordSpec
 from sniff.cli import USAGE, Failure, arguments, listening, outlets, printing, targets, telling
+from sniff.cli.interruption import until_interrupted
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -73,15 +74,16 @@ def run(args: argparse.Namespace) -> int:
         raise Failure("--before, --after: round which trigger? say with --on FILTER or --on CODE", USAGE)
     told_to = outlets.prepare(outlets.settings_of(args))
     record = RecordSpec(path, args.rotate, args.keep, before, after, args.keep_free)
-    lives = listening.start_all(buses, record, args.duration, args.count, watched=False)
-    try:
-        printers = [printing.Printer(live, quiet=True) for live in lives]
-        telling.add_triggers(printers, args.on)
-        with telling.alerting(printers), outlets.telling(lives, told_to) as printers[0].telling:
-            code = listening.run(printers, not args.quiet)
-    except KeyboardInterrupt:  # before anybody listened to signals: the capture must not go on
-        lives[0].stop()
-        raise
+    with until_interrupted():  # from before it begins: else it might go on with nobody who ends it
+        lives = listening.start_all(buses, record, args.duration, args.count, watched=False)
+        try:
+            printers = [printing.Printer(live, quiet=True) for live in lives]
+            telling.add_triggers(printers, args.on)
+            with telling.alerting(printers), outlets.telling(lives, told_to) as printers[0].telling:
+                code = listening.run(printers, not args.quiet)
+        except BaseException:
+            lives[0].stop()
+            raise
     if not args.quiet:
         listening.say_end(printers)
     return code

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
+from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.cli import main
 from sniff.formats import read
 from sniff.simulation.bus import VirtualBus
 from sniff.simulation.ports import HAS_PTY
 from sniff.simulation.scenarios import scenario
+from tests.e2e.running import PATIENCE, rest_of
+
+LONGEST = 40
+"""Octets that a frame of the simulated bus has at most, on average."""
 
 pytestmark = pytest.mark.skipif(not HAS_PTY, reason="this system has no pseudo-terminals")
 
@@ -65,12 +72,27 @@ def test_rubbish_is_not_called_silent() -> None:
     assert found["octets"] > 0
 
 
+def heard(path: Path) -> bytes:
+    """What is in a file so far."""
+    return b"".join(item.octets for item in read(path).items() if isinstance(item, Chunk)) if path.exists() else b""
+
+
 def test_record_goes_on_with_what_was_found_on_the_same_opening(tmp_path: Path) -> None:
     path = tmp_path / "found.mcap"
     with VirtualBus.from_scenario(scenario("mstp", 1, False)) as bus:
-        ran = sniff485("record", bus.tap(), "-p", "auto", "-s", "38400,8N1", "-w", str(path), "--duration", "1.5")
-    assert ran.returncode == 0, ran.stderr
-    assert "BACnet MS/TP, 38400,8N1" in ran.stderr
+        words = "record", bus.tap(), "-p", "auto", "-s", "38400,8N1", "-w", str(path)
+        process = subprocess.Popen(
+            [sys.executable, "-m", "sniff", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        assert process.stderr is not None
+        found = next((line for line in process.stderr if "BACnet MS/TP, 38400,8N1" in line), "")
+        octets = len(heard(path))
+        until = time.monotonic() + PATIENCE
+        while len(heard(path)) < octets + 60 * LONGEST and time.monotonic() < until:
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        _, errors = rest_of(process)
+    assert process.returncode == 0, found + errors
     capture = read(path)
     assert (capture.session.protocol, str(capture.session.line)) == ("mstp", "38400,8N1")
     shown = sniff485("info", "--json", str(path))

@@ -19,6 +19,11 @@ from pathlib import Path
 import pytest
 
 from dissectors.frame import Chunk
+from dissectors.line import LineSettings
+from sniff.capture import link as link_module
+from sniff.capture.config import SourceSpec
+from sniff.capture.link import CaptureLink
+from sniff.cli import main
 from sniff.formats import read
 
 pytest.importorskip("termios")
@@ -200,6 +205,32 @@ def test_a_signal_ends_it_whole(begin, bus, tmp_path, number) -> None:
     assert process.returncode == 0
     assert "recorded to x.mcap" in errors
     assert read(tmp_path / "x.mcap").completeness().whole
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_it_begins_ends_it_whole(bus, tmp_path, monkeypatch, capsys, number) -> None:
+    """The recording has begun, and nobody has come to listen to it."""
+    start = CaptureLink.start
+
+    def start_and_be_stopped(*words: object) -> CaptureLink:
+        link = start(*words)
+        os.kill(os.getpid(), number)
+        return link
+
+    monkeypatch.setattr(CaptureLink, "start", start_and_be_stopped)
+    path = tmp_path / "x.mcap"
+    assert main(["record", str(bus.link), *LINE, "-w", str(path)]) == 0
+    assert f"recorded to {path}" in capsys.readouterr().err
+    assert read(path).completeness().whole
+
+
+def test_one_that_is_not_wanted_any_more_need_not_begin(bus, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(link_module, "LEFT_TO_GREET", 0.0)
+    monkeypatch.setattr(CaptureLink, "_fill", lambda self, timeout: True)  # it never greets
+    with pytest.raises(KeyboardInterrupt):
+        CaptureLink.start(
+            [SourceSpec(str(bus.link), LineSettings.parse(LINE[1]), "modbus-rtu")], is_given_up=lambda: True
+        )
 
 
 def test_a_port_that_goes_and_comes_back(begin, bus, tmp_path) -> None:
