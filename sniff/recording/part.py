@@ -1,7 +1,7 @@
 """One MCAP file being written: session first, messages in compressed chunks, cut off whenever it is flushed.
 
 Octets of the bus must be in the file within a second, in small chunks; results of the engine need not, and are kept
-back until there are enough for a chunk of their own: JSON of half a minute packs many times smaller than by the second.
+back until there are enough for a chunk of their own: JSON of two minutes packs many times smaller than by the second.
 
 What the file does not take (disk full) waits in memory, so that the file stays whole up to where it ends and goes on
 without a seam when there is room again.
