@@ -104,8 +104,10 @@ def test_a_sync_that_hangs_keeps_nothing_from_the_file(record, bus, disk) -> Non
 
 def test_stopping_waits_for_a_disk_and_says_so(record, bus, disk) -> None:
     command = record(environment=disk.environment)
+    bus.feed(POLL * 100)
+    wait_until(lambda: len(octets_of(record.folder / "x.mcap")) == len(bus.fed), "nothing is recorded")
     disk.shut("write")
-    bus.feed(POLL * 500)
+    bus.feed(POLL * 400)
     disk.until_it_waits("write")
     bus.until_read()
     command.send(signal.SIGINT)
