@@ -195,13 +195,7 @@ def settled_end(known: bytes, at: int) -> int:
     if _is_exception(known, at):
         end = at + EXCEPTION_LENGTH
         return end if end < len(known) and not crc16_modbus(known[at:end]) else 0
-    end = _goes_on(known, at)
-    if end:
-        return end
-    for end in _good_ends(known, at):
-        if _begins_exchange(known, end):
-            return end
-    return 0
+    return next((end for end in _good_ends(known, at) if _is_agreed(known, at, end)), 0)
 
 
 def _is_agreed(known: bytes, at: int, after: int) -> bool:
