@@ -85,6 +85,7 @@ class Dissector:
     dot where none are given.
     `noun`: what its people call a place on the bus. `family`: under which name device profiles speak of it.
     `bits(frame)`: how much a good frame speaks for this protocol: log2 of how seldom random octets hold one like it.
+    `sieve(octets)`: False where octets that stand alone hold no good frame, whatever their times; told in a few µs.
     `judge`: makes the rules at work on a bus; `rules`: their catalogue, by code.
     `ring`: how its token ring is watched and shown, if it passes a token.
     `readings`: what exchanges say of the things inside a station; `refusal`: the code with which one refuses.
@@ -121,6 +122,7 @@ class Dissector:
     noun: str = "station"
     family: str = ""
     bits: Callable[[Frame], float] = lambda frame: RARE_BITS
+    sieve: Callable[[bytes], bool] = lambda octets: True
     judge: Callable[[Timing], Judge] | None = None
     rules: Mapping[str, Rule] = field(default_factory=dict)
     ring: TokenRing | None = None

@@ -7,6 +7,7 @@ from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.fields import fields
 from dissectors.bacnet.findings import MstpFindings, judge
+from dissectors.bacnet.frame_types import PREAMBLE
 from dissectors.bacnet.framing import MstpFramer
 from dissectors.bacnet.header import peek
 from dissectors.bacnet.ip_framing import IP_NAME, IpFramer
@@ -56,6 +57,11 @@ def bits(frame: Frame) -> float:
     return 24.0
 
 
+def sieve(octets: bytes) -> bool:
+    """Whether there is a preamble."""
+    return PREAMBLE in octets
+
+
 RING = TokenRing(
     observer=BulkRingObserver,
     window=ring_window,
@@ -83,6 +89,7 @@ MSTP = Dissector(
     noun="MAC",
     family="bacnet",
     bits=bits,
+    sieve=sieve,
     judge=MstpFindings,
     rules=RULES,
     ring=RING,

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+
+from dissectors.checksums import ends_with_crc16
 from dissectors.frame import Frame
 from dissectors.line import Timing
 from dissectors.manifest import Dissector, PacketFile, on_first_use
@@ -11,6 +14,7 @@ from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, make_ascii, make_rt
 from dissectors.modbus.fields import answer_fields, fields
 from dissectors.modbus.framing import RtuFramer
 from dissectors.modbus.header import peek_ascii, peek_rtu
+from dissectors.modbus.lengths import MIN_FRAME
 from dissectors.modbus.places import place, spans
 from dissectors.modbus.readings import asks, readings, refusal
 from dissectors.modbus.renamer import AsciiRenamer, RtuRenamer
@@ -51,6 +55,11 @@ rtu_field_types = on_first_use("dissectors.modbus.field_types:rtu_types")
 ascii_field_types = on_first_use("dissectors.modbus.field_types:ascii_types")
 reading_columns = on_first_use("dissectors.modbus.reading_columns:reading_columns")
 
+_SIEVED = 40
+"""Octets of which each stretch is tried: some 700 of them."""
+
+_DIGITS = re.compile(b"[0-9A-Fa-f\xb0-\xb9\xc1-\xc6\xe1-\xe6]{6}")
+
 
 def rtu_bits(frame: Frame) -> float:
     """Evidence of a good RTU frame: among random octets one in 2.8e-6 octets was measured (18 bits), nearly half of
@@ -58,9 +67,22 @@ def rtu_bits(frame: Frame) -> float:
     return 18.0 if len(frame.octets) >= 6 else 6.0
 
 
+def rtu_sieve(octets: bytes) -> bool:
+    """Whether some octets in a row have a good CRC; of long stretches that is not asked: framing them costs less."""
+    if len(octets) > _SIEVED:
+        return True
+    ends = range(len(octets), MIN_FRAME - 1, -1)
+    return any(ends_with_crc16(octets[begin:end]) for end in ends for begin in range(end - MIN_FRAME + 1))
+
+
 def ascii_bits(frame: Frame) -> float:
     """Evidence of a good ASCII frame: each character comes from a small alphabet, 3 bits."""
     return 3.0 * len(frame.octets)
+
+
+def ascii_sieve(octets: bytes) -> bool:
+    """Whether there are the digits of a unit, a function and an LRC in a row, whatever their highest bit."""
+    return _DIGITS.search(octets) is not None
 
 
 def ascii_tracker(timing: Timing) -> ModbusTracker:
@@ -85,6 +107,7 @@ RTU = Dissector(
     default_line="19200,8E1",
     field_prefixes=("mbrtu.", "modbus."),
     bits=rtu_bits,
+    sieve=rtu_sieve,
     packet_file=PacketFile((252, 147, 250), "mbrtu", ports=((502, "Modbus TCP"),)),
     renamer=RtuRenamer,
     makers={RTU_NAME: make_rtu},
@@ -120,6 +143,7 @@ ASCII = Dissector(
     default_line="19200,7E1",
     field_prefixes=("mbascii.", "modbus."),
     bits=ascii_bits,
+    sieve=ascii_sieve,
     renamer=AsciiRenamer,
     makers={ASCII_NAME: make_ascii},
     scenarios=on_first_use("dissectors.modbus.scenario:ascii_scenarios"),

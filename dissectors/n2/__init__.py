@@ -45,6 +45,11 @@ def bits(frame: Frame) -> float:
     return 3.0 * len(frame.octets)
 
 
+def sieve(octets: bytes) -> bool:
+    """Whether there is the begin and the end of a frame."""
+    return b"\r" in octets and (b">" in octets or b"A" in octets or b"N" in octets)
+
+
 N2 = Dissector(
     name="n2",
     title="Metasys N2",
@@ -61,6 +66,7 @@ N2 = Dissector(
     packet=packet,
     default_line="9600,8N1",
     bits=bits,
+    sieve=sieve,
     judge=judge,
     rules=RULES,
     readings=readings,

@@ -6,7 +6,7 @@ from dissectors.frame import Frame
 from dissectors.manifest import Dissector, PacketFile, on_first_use
 from dissectors.profibus import ring_words
 from dissectors.profibus.fields import fields
-from dissectors.profibus.framing import ProfibusFramer
+from dissectors.profibus.framing import STARTS, ProfibusFramer
 from dissectors.profibus.header import peek
 from dissectors.profibus.readings import readings
 from dissectors.profibus.renamer import ProfibusRenamer
@@ -34,6 +34,11 @@ def bits(frame: Frame) -> float:
     return _EVIDENCE.get(len(frame.octets), 24.0)
 
 
+def sieve(octets: bytes) -> bool:
+    """Whether there is the begin of a telegram."""
+    return STARTS.search(octets) is not None
+
+
 RING = TokenRing(
     observer=watch,
     window=ring_window,
@@ -59,6 +64,7 @@ PROFIBUS = Dissector(
     field_prefixes=("pb.",),
     field_types=on_first_use("dissectors.profibus.field_types:types"),
     bits=bits,
+    sieve=sieve,
     judge=judge,
     rules=RULES,
     ring=RING,

@@ -41,7 +41,7 @@ _CHAIN = 3
 STRAY_MOST = 3
 """Stray octets between a request and its short acknowledgement."""
 
-_STARTS = re.compile(rb"[\x10\x68\xa2\xdc\xe5]")
+STARTS = re.compile(rb"[\x10\x68\xa2\xdc\xe5]")
 _CHECKED = frozenset((SD1, SD2, SD3))
 
 
@@ -83,7 +83,7 @@ class ProfibusFramer(PlainFramer):
         """Place and length of the next telegram; length 0 where none begins before that place; None: not yet known."""
         octets = self._window.octets
         most = min(len(octets), MOST_HELD)
-        while match := _STARTS.search(octets, self._at, most):
+        while match := STARTS.search(octets, self._at, most):
             self._at = match.start()
             length = self._length(self._at, last)
             if length is None:
@@ -144,7 +144,7 @@ class ProfibusFramer(PlainFramer):
         return (source & 0x7F, to & 0x7F) == self._asked and not control & REQUEST
 
     def _may_acknowledge(self, at: int) -> bool:
-        return not at or (at <= STRAY_MOST and not _STARTS.search(self._window.octets, 0, at))
+        return not at or (at <= STRAY_MOST and not STARTS.search(self._window.octets, 0, at))
 
     def _token(self, at: int) -> int | None:
         octets = self._window.octets

@@ -1,4 +1,8 @@
-"""Evidence of a second protocol on one bus, in the octets that no frame of the first holds. Pure, bounded."""
+"""Evidence of a second protocol on one bus, in the octets that no frame of the first holds. Pure, bounded.
+
+What the first leaves comes as *stretches*: octets with nothing good of the first between them. No frame of another
+protocol reaches over one of the first; so a stretch that a protocol's sieve knows to hold nothing good is never framed.
+"""
 
 from __future__ import annotations
 
@@ -20,13 +24,18 @@ LATER = 10 * NS_PER_S
 
 
 def second_in(
-    rest: Sequence[Chunk], session: Session, others: Sequence[str], enough: float = SECOND_BITS
+    stretches: Sequence[Sequence[Chunk]], session: Session, others: Sequence[str], enough: float = SECOND_BITS
 ) -> tuple[str, int] | None:
-    """The protocol among `others` that makes good frames of these stretches, each at its end, and how many; None where
-    none has evidence enough (bits)."""
+    """The protocol among `others` that makes good frames of these stretches, each piece at its end, and how many; None
+    where none has evidence enough (bits)."""
     found: list[tuple[float, str, int]] = []
-    for name in others if rest else ():
+    octets = [b"".join([chunk.octets for chunk in stretch]) for stretch in stretches]
+    for name in others:
         dissector = registry.get(name)
+        may_hold = map(dissector.sieve, octets)
+        rest = [chunk for stretch, may in zip(stretches, may_hold, strict=True) if may for chunk in stretch]
+        if not rest:
+            continue
         line = LineSettings.parse(dissector.default_line) if session.line_is_assumed else session.line
         if not _has_frames(rest, dissector.framer(Timing(line, session.adapter.latency))):
             continue

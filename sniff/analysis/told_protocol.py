@@ -15,9 +15,10 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import groupby
 
 from dissectors import registry
-from dissectors.frame import Chunk, Frame, Noise
+from dissectors.frame import Chunk, Frame
 from dissectors.line import NS_PER_S, LineSettings, Timing
 from dissectors.manifest import Dissector
 from sniff.analysis.autodetect import (
@@ -145,16 +146,16 @@ def _second(session: Session, best: Candidature, others: Sequence[str]) -> tuple
     return second_in(rest, replace(session, line=best.line), others)
 
 
-def noise_of(session: Session, protocol: str, line: LineSettings) -> list[Chunk]:
-    """What of the sample is in no good frame of a protocol, each stretch at its end."""
+def noise_of(session: Session, protocol: str, line: LineSettings) -> list[list[Chunk]]:
+    """What of the sample is in no good frame of a protocol: stretches between good frames, each piece at its end."""
     engine = Engine(registry.get(protocol), Timing(line, session.adapter.latency))
     outputs = [engine.feed(chunk) for chunk in session.sample]
     outputs.append(engine.advance(session.sample[-1].time + 10 * NS_PER_S))
-    rows = [row for output in outputs for row in output.rows]
+    events = [row.event for output in outputs for row in output.rows]
     return [
-        Chunk(row.event.end, row.event.octets)
-        for row in rows
-        if isinstance(row.event, Noise) or (isinstance(row.event, Frame) and not row.event.ok)
+        [Chunk(event.end, event.octets) for event in stretch]
+        for is_good, stretch in groupby(events, lambda event: isinstance(event, Frame) and event.ok)
+        if not is_good
     ]
 
 

@@ -51,7 +51,7 @@ class SecondProof:
         known = not session.unknown and session.protocol in registry.names()  # a relative on networks has streams
         self._asks = known and not self.name
         self._octets = self._window = self._asked = 0
-        self._sample: deque[Chunk] = deque()
+        self._sample: deque[tuple[int, Chunk]] = deque()  # with the number of the row
         self._sampled = self._fresh = 0  # octets of the sample, and those of them that were not asked
         self._first_left = 0  # number of the row
         self._is_asked = False  # whether this window was
@@ -109,11 +109,11 @@ class SecondProof:
         octets = row.event.octets[:SAMPLE]
         if not self._fresh:
             self._first_left = row.no
-        self._sample.append(Chunk(row.event.end, octets))
+        self._sample.append((row.no, Chunk(row.event.end, octets)))
         self._sampled += len(octets)
         self._fresh += len(octets)
-        while self._sampled - len(self._sample[0].octets) >= SAMPLE:
-            self._sampled -= len(self._sample.popleft().octets)
+        while self._sampled - len(self._sample[0][1].octets) >= SAMPLE:
+            self._sampled -= len(self._sample.popleft()[1].octets)
         if self._fresh >= SAMPLE:
             self._ask()
             self._is_asked = True
@@ -126,10 +126,21 @@ class SecondProof:
         self._asked += 1
         session = self._session
         others = [one.name for one in registry.usable() if one.name != session.protocol]
-        found = second_in(self._sample, session, others, SECOND_BITS + math.log2(self._asked))
+        found = second_in(self._stretches(), session, others, SECOND_BITS + math.log2(self._asked))
         if found is not None:
             self.name, self.since, self._asks = found[0], self._first_left, False
             self._sample.clear()
+
+    def _stretches(self) -> list[list[Chunk]]:
+        """The sample, rows that follow one another together."""
+        stretches: list[list[Chunk]] = []
+        before = None
+        for no, chunk in self._sample:
+            if no - 1 != before:
+                stretches.append([])
+            stretches[-1].append(chunk)
+            before = no
+        return stretches
 
 
 def is_left(row: Row) -> bool:
