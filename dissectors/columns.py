@@ -48,6 +48,10 @@ VERDICTS = tuple(Verdict)
 """What the codes in `check`, `found`, `damage`, `role` and `verdict` stand for: the member at that place."""
 
 
+UNSAID = 255
+"""In `damage` of rows that are handed to a pairing: columns do not say all of that row."""
+
+
 def some(value: np.integer[Any]) -> int | None:
     """An optional number; None for `NONE`."""
     number = int(value)
@@ -353,8 +357,8 @@ class Pairing(Protocol):
     ) -> BlockPairing:
         """`tracker`: will be moved. `octets`: where `frames.offset` counts. `slack`: ns, of each frame.
 
-        Among frames of the kernel there may be rows that the reference framer gave, noise too: they are not `ok`, their
-        other columns may say anything, and the tracker must take them.
+        Among frames of the kernel there may be rows that the reference framer gave, noise too. Those of which columns
+        do not say all are not `ok`, `damage` is UNSAID, other columns may say anything: the tracker must take them.
         """
         ...
 

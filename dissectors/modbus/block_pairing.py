@@ -38,7 +38,7 @@ class ModbusBlockPairing:
         self._protocol = protocol
         self._tracker = tracker
         self._frames, self._octets, self._timing, self._slack = frames, octets, timing, slack
-        self._found = exchanges(*(twins or (frames, octets)), timing, slack)
+        self._found = exchanges(*(twins or (frames, octets)), timing, slack, damaged=twins is None)
         self._last = self._found.last
         self._rows: Times = np.zeros(0, np.int64)  # of all exchanges before each, once they are placed
         self._whole: tuple[Times, PlacementColumns, TransactionColumns] | None = None
@@ -59,7 +59,7 @@ class ModbusBlockPairing:
         placements, transactions = self._placed(which, no - begin)
         self._let_pass(place, end, no - begin)
         closed_by = self._last[which].copy()
-        closed_by[:-1] = np.where(found.unanswered[which][:-1], found.request[which][1:], closed_by[:-1])
+        closed_by[:-1] = np.where(found.goes_on[which][:-1], found.request[which][1:], closed_by[:-1])
         return Run(begin, last + 1, placements, transactions, closed_by)
 
     def _placed(self, which: slice, to_number: int) -> tuple[PlacementColumns, TransactionColumns]:
@@ -68,7 +68,7 @@ class ModbusBlockPairing:
         if self._whole is None:
             numbers = np.arange(len(self._frames)) + to_number  # the rows follow one another: the same in every run
             everything = slice(0, len(found))
-            self._rows = np.append(0, np.cumsum(1 + found.answered))
+            self._rows = np.append(0, np.cumsum(1 + (found.answered | found.garbled)))
             self._whole = (
                 numbers,
                 *placed(found, self._frames, everything, numbers, 0, self._timing, self._slack),
@@ -94,7 +94,10 @@ class ModbusBlockPairing:
         tx = self._tracker.next_tx
         made: dict[int, Exchange] = {}
         for one in sorted({*went.answered, *went.given_up, end - 1}):
-            request = Exchange(tx + one - place, self._seen(int(found.request[one]), to_number), bool(found.sure[one]))
+            row = int(found.request[one])
+            request = Exchange(tx + one - place, self._seen(row, to_number), bool(found.sure[one]))
+            if found.faulty[one]:
+                request.fault = request.request.header.error
             request.answered = bool(found.answered[one])
             request.outlives = outlives(found, one, end)
             request.waited = int(found.gap[one]) if found.unanswered[one] else None

@@ -144,7 +144,7 @@ class Exchange:
         if error is None and self.asks_nobody:
             error = f"unit {answer.unit} answered a request to address 0"
         if error is None and self.fault:
-            error = f"request damaged at this tap: {self.fault}"
+            error = damaged_request(self.fault)
         if error is None and self.garble:
             error = f"before the answer: {self.garble.error}"
         attempt = self.attempt + sum(copy is not answer for copy in self.copies)
@@ -183,6 +183,11 @@ def answer_apart(tx: int, seen: Seen, verdict: Verdict, other: Exchange | None, 
         of=other.tx if other else None,
         error=error or seen.header.error,
     )
+
+
+def damaged_request(fault: str) -> str:
+    """In words: the request came damaged, and was answered all the same."""
+    return f"request damaged at this tap: {fault}"
 
 
 def is_begin_of(octets: bytes, whole: bytes) -> bool:

@@ -6,33 +6,39 @@ Regular is what `ModbusTracker` decides by the octets of neighbouring frames, as
     a request, and another one directly behind it                    of the same: no answer, perhaps repeated
     a write of one register or coil, and its copy or an exception    by turns, behind a regular exchange
     a write to all stations                                          behind a regular exchange
+    a request, its damaged answer, and another request directly behind   where the damage left unit and function
+    a damaged request and its answer directly behind it                  the same, and behind an answer
 
 Regular exchanges directly behind one another are a *run*. The contract, held by a property test: if the tracker is at
 rest where an exchange of a run begins (nothing is open, waits or is doubted, and what closed last was answered), it
 gives that exchange and those behind it, as far as `exchange_memory.holding` says, exactly as `placed` has them. All
-else goes through the tracker: what is damaged, late, said twice the same, and functions that few use.
+else goes through the tracker: what is damaged in another way, late, said twice the same, and functions that few use.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from dissectors.columns import (
+    CHECKS,
+    DAMAGES,
     NONE,
     ROLES,
     VERDICTS,
     FrameColumns,
     Masks,
+    Names,
     Octets,
     PlacementColumns,
     Times,
     TransactionColumns,
 )
-from dissectors.frame import Role
+from dissectors.frame import Check, Damage, Role
 from dissectors.line import NS_PER_S, Timing
+from dissectors.modbus.exchange import damaged_request
 from dissectors.modbus.functions import EXCEPTION_BIT, ITEMS_ASKED
 from dissectors.modbus.learned_timing import LearnedTiming
 from dissectors.modbus.length_columns import PADDING, answer_lengths, of_codes
@@ -47,10 +53,18 @@ _AT_ONCE: Final = 1 << 14  # copies looked at together
 _REQUEST, _RESPONSE, _EITHER, TO_ALL = (
     ROLES.index(role) for role in (Role.REQUEST, Role.RESPONSE, Role.EITHER, Role.BROADCAST)
 )
-_ANSWERED, _RETRY, _EXCEPTION, _BROADCAST, _NO_RESPONSE = (
+_ANSWERED, _RETRY, _EXCEPTION, _BROADCAST, _NO_RESPONSE, _DAMAGED_ANSWER = (
     VERDICTS.index(verdict)
-    for verdict in (Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION, Verdict.BROADCAST, Verdict.NO_RESPONSE)
+    for verdict in (
+        Verdict.ANSWERED,
+        Verdict.RETRY,
+        Verdict.EXCEPTION,
+        Verdict.BROADCAST,
+        Verdict.NO_RESPONSE,
+        Verdict.DAMAGED_ANSWER,
+    )
 )
+_WRONG_CHECK: Final = DAMAGES.index(Damage.CHECK), CHECKS.index(Check.BAD)
 _SHORT: Final = 8
 _PAIRED: Final = frozenset((*ITEMS_ASKED, *RANGES_REPEATED))
 
@@ -59,17 +73,21 @@ _PAIRED: Final = frozenset((*ITEMS_ASKED, *RANGES_REPEATED))
 class ExchangeColumns:
     """Regular exchanges in order, one entry an exchange.
 
-    `request`: its first row. `answered`: whether the next row is its answer; else it has but one. `unanswered`: the
-    next row is another request; else, without an answer, it is a write to all stations. `repeat`: it says what the
-    unanswered one directly before it said. `run`: number of its run. `unit`: station asked. `gap`: ns from request to
-    answer, or to the next request of one unanswered. `sure`: its frames can be nothing else. `copy`: answered by the
+    `request`: its first row. `answered`: whether the next row is its answer. `garbled`: the next row is its damaged
+    answer, and the one behind that another request. `unanswered`: the next row is another request. What is none of
+    these is a write to all stations; this and what is unanswered has one row. `faulty`: the request is damaged, and
+    answered. `repeat`: it says what the one directly before it said, to which no good answer came. `run`: number of its
+    run. `unit`: station asked. `gap`: ns from request to answer, or to the next request of one unanswered or garbled.
+    `sure`: its frames can be nothing else. `copy`: answered by the
     copy of its request. `writes`: whether it stores something. `at_once`: its copy comes so soon that it could be an
     echo. `samples`: of a copy, response times of writes of its station in this run before.
     """
 
     request: Times
     answered: Masks
+    garbled: Masks
     unanswered: Masks
+    faulty: Masks
     repeat: Masks
     run: Times
     unit: Times
@@ -86,44 +104,66 @@ class ExchangeColumns:
     @property
     def last(self) -> Times:
         """Last row of each."""
-        return self.request + self.answered
+        return self.request + (self.answered | self.garbled)
+
+    @property
+    def goes_on(self) -> Masks:
+        """Which close with the request behind them."""
+        return self.unanswered | self.garbled
 
     def take(self, which: Masks) -> ExchangeColumns:
         """Some of them."""
         return ExchangeColumns(*(getattr(self, one.name)[which] for one in fields(self)))
 
 
-def exchanges(frames: FrameColumns, octets: Octets, timing: Timing, slack: Times | None = None) -> ExchangeColumns:
-    """The regular exchanges among frames. `octets`: of all reads. `slack`: of each frame, ns; the latency if None."""
+def exchanges(
+    frames: FrameColumns, octets: Octets, timing: Timing, slack: Times | None = None, damaged: bool = True
+) -> ExchangeColumns:
+    """The regular exchanges among frames. `octets`: of all reads. `slack`: of each frame, ns; the latency if None.
+    `damaged`: whether those of which a frame is damaged may be among them."""
     octets = np.concatenate((octets, np.zeros(PADDING, np.uint8)))
-    request, answered, unanswered = _candidates(frames, octets)
-    run = _runs(frames, octets, request, answered)
+    found = _candidates(frames, octets, damaged)
+    run = _runs(frames, octets, found)
     left = run >= 0
-    request, answered, unanswered, run = request[left], answered[left], unanswered[left], run[left]
-    last = request + answered
+    request, run = found.request[left], run[left]
+    answered, unanswered, garbled, faulty = (
+        column[left] for column in (found.answered, found.unanswered, found.garbled, found.faulty)
+    )
+    last = request + (answered | garbled)
     unit = octets[frames.offset[request]].astype(np.int64)
-    waits = answered | unanswered
-    gap = np.where(waits, np.maximum(frames.start[request + waits] - frames.end[request], 0), 0)
+    ends_at = last + (unanswered | garbled)  # the row at which the wait is over
+    gap = np.where(ends_at > request, np.maximum(frames.start[ends_at] - frames.end[request], 0), 0)
     repeat = np.zeros(len(run), bool)
     said = _word(octets, frames.offset[request])
-    repeat[1:] = unanswered[:-1] & (run[1:] == run[:-1]) & (said[1:] == said[:-1])
-    sure = frames.role[request] == _REQUEST
+    repeat[1:] = (unanswered | garbled)[:-1] & (run[1:] == run[:-1]) & (said[1:] == said[:-1])
+    sure = (frames.role[request] == _REQUEST) & ~faulty
     copy = answered & ~sure & (frames.role[last] == _EITHER)
     writes = of_codes(SINGLE_WRITES | RANGES_REPEATED, False)[frames.function[request]]
     limit = max(7 * timing.char // 2, timing.char + timing.latency)
     at_once = copy & (np.maximum(gap - _slack(frames, timing, slack)[last], 0) <= limit)
     none = np.zeros(len(run), np.int64)
-    found = ExchangeColumns(request, answered, unanswered, repeat, run, unit, gap, sure, copy, writes, at_once, none)
+    made = ExchangeColumns(
+        request, answered, garbled, unanswered, faulty, repeat, run, unit, gap, sure, copy, writes, at_once, none
+    )
     too_soon = repeat & answered & (gap < 7 * timing.char // 2)  # the answer of an attempt before
-    return _in_time(_cut(found, too_soon), LearnedTiming(timing).tolerance)
+    return _in_time(_cut(made, too_soon), LearnedTiming(timing).tolerance)
 
 
 def _slack(frames: FrameColumns, timing: Timing, slack: Times | None) -> Times:
     return np.full(len(frames), timing.latency) if slack is None else slack
 
 
-def _candidates(frames: FrameColumns, octets: Octets) -> tuple[Times, Masks, Masks]:
-    """First rows of what is an exchange if nothing is open before it; whether it is answered, or another follows."""
+class _Candidates(NamedTuple):
+    """First rows of what is an exchange if nothing is open before it, and what becomes of it."""
+
+    request: Times
+    answered: Masks
+    unanswered: Masks
+    garbled: Masks
+    faulty: Masks
+
+
+def _candidates(frames: FrameColumns, octets: Octets, damaged: bool) -> _Candidates:
     count = len(frames)
     chained = frames.chained
     fine = (frames.damage == 0) & frames.ok
@@ -155,10 +195,57 @@ def _candidates(frames: FrameColumns, octets: Octets) -> tuple[Times, Masks, Mas
     whole = (asks & answers) | (either & (answers | copies) & (turn & 1 == 0))
     unanswered = np.zeros(count, bool)
     at = np.flatnonzero(asks[:-1] & asks[1:] & chained[1:])
-    long = (frames.length[at] > _SHORT) | (frames.length[at + 1] > _SHORT)
-    unanswered[at] = ~long | (_word(octets, place[at]) != _word(octets, place[at + 1]))  # of longer ones only that
-    first = np.flatnonzero(whole | to_all | unanswered)
-    return first, whole[first], unanswered[first]
+    unanswered[at] = _is_told_apart(frames, octets, at, at + 1)
+    garbled, faulty = np.zeros(count, bool), np.zeros(count, bool)
+    if damaged:
+        garbled, faulty = _damaged(frames, octets, asks)
+    first = np.flatnonzero(whole | to_all | unanswered | garbled | faulty)
+    answered = whole | faulty
+    return _Candidates(first, answered[first], unanswered[first], garbled[first], faulty[first])
+
+
+def _is_told_apart(frames: FrameColumns, octets: Octets, at: Times, following: Times) -> Masks:
+    """Whether eight octets tell if two requests say the same."""
+    long = (frames.length[at] > _SHORT) | (frames.length[following] > _SHORT)
+    apart: Masks = ~long | (_word(octets, frames.offset[at]) != _word(octets, frames.offset[following]))
+    return apart
+
+
+def _damaged(frames: FrameColumns, octets: Octets, asks: Masks) -> tuple[Masks, Masks]:
+    """First rows of requests to which a damaged answer came, and another request follows; of damaged ones with their
+    answer. Unit and function are what they were in both frames, so that it does not matter when they came."""
+    garbled, faulty = np.zeros(len(frames), bool), np.zeros(len(frames), bool)
+    damage, check = _WRONG_CHECK
+    wrong = np.flatnonzero((frames.damage == damage) & (frames.check == check) & ~frames.ok & (frames.error != 0))
+    wrong = wrong[(wrong > 0) & (wrong + 1 < len(frames))]
+    wrong = wrong[frames.chained[wrong] & frames.chained[wrong + 1]]
+    place = frames.offset
+    asked, following = wrong - 1, wrong + 1
+    right = (
+        asks[asked]
+        & asks[following]
+        & (frames.role[wrong] != _REQUEST)
+        & _same_unit_and_code(octets, place, asked, wrong)
+    )
+    right &= (frames.length[wrong] >= frames.length[asked]) | (  # else it may be the begin of an echo
+        octets[place[wrong] + 2] != octets[place[asked] + 2]
+    )
+    right &= (frames.start[following] - frames.end[asked] < GIVE_UP) & _is_told_apart(frames, octets, asked, following)
+    garbled[asked[right]] = True
+    right = of_codes(_PAIRED, False)[frames.function[wrong]] & (frames.role[wrong] == _REQUEST)
+    right &= (octets[place[wrong]] > 0) & _same_unit_and_code(octets, place, wrong, following)
+    right &= (frames.damage[following] == 0) & frames.ok[following] & (frames.role[following] == _RESPONSE)
+    right &= (frames.error[following] == 0) | (octets[place[following] + 1] & EXCEPTION_BIT != 0)
+    right &= _word(octets, place[wrong]) != _word(octets, place[following])
+    right &= frames.start[following] - frames.end[wrong] < GIVE_UP
+    faulty[wrong[right]] = True
+    return garbled, faulty
+
+
+def _same_unit_and_code(octets: Octets, place: Times, asks: Times, answers: Times) -> Masks:
+    same = octets[place[asks]] == octets[place[answers]]
+    fits: Masks = same & (octets[place[asks] + 1] == octets[place[answers] + 1] & ~np.uint8(EXCEPTION_BIT))
+    return fits
 
 
 def _word(octets: Octets, place: Times) -> Times:
@@ -167,13 +254,15 @@ def _word(octets: Octets, place: Times) -> Times:
     return word
 
 
-def _runs(frames: FrameColumns, octets: Octets, request: Times, answered: Masks) -> Times:
+def _runs(frames: FrameColumns, octets: Octets, found: _Candidates) -> Times:
     """The run that each candidate belongs to; NONE where it is not regular. A run begins with what is sure."""
-    sure = frames.role[request] == _REQUEST
+    request, answered, faulty = found.request, found.answered, found.faulty
+    sure = (frames.role[request] == _REQUEST) & ~faulty
     follows = np.zeros(len(request), bool)
-    follows[1:] = (request[1:] == (request + answered)[:-1] + 1) & frames.chained[request[1:]]
+    last = request + (answered | found.garbled)
+    follows[1:] = (request[1:] == last[:-1] + 1) & frames.chained[request[1:]]
     said = _word(octets, frames.offset[request])
-    follows[1:] &= sure[1:] | (said[1:] != said[:-1])
+    follows[1:] &= sure[1:] | np.where(faulty[1:], answered[:-1], said[1:] != said[:-1])
     return _numbered(sure, follows)
 
 
@@ -248,7 +337,8 @@ def placed(
     `numbers`: of all frames, as the tracker would be told. `tx`: number of the first of the transactions.
     """
     request, answered, unit = found.request[which], found.answered[which], found.unit[which]
-    last, count = request + answered, len(request)
+    garbled, faulty = found.garbled[which], found.faulty[which]
+    last, count = request + (answered | garbled), len(request)
     held_back = _slack(frames, timing, slack)
     gap = found.gap[which]
     place = np.arange(count)
@@ -257,13 +347,15 @@ def placed(
     verdict = np.where(found.unanswered[which], _NO_RESPONSE, _BROADCAST)
     verdict[answered] = np.where(attempt > 1, _RETRY, _ANSWERED)[answered]
     verdict[answered & (frames.error[last] != 0)] = _EXCEPTION
+    verdict[garbled] = _DAMAGED_ANSWER
+    error, names = _errors(frames, np.where(answered | garbled, frames.error[last], 0), faulty, request)
     number = tx + place
     transactions = TransactionColumns(
         number,
         unit.astype(np.int16),
-        frames.kind[request],
+        frames.kind[np.where(faulty, last, request)],
         numbers[request],
-        np.where(answered, numbers[last], NONE),
+        np.where(answered | garbled, numbers[last], NONE),
         verdict.astype(np.uint8),
         frames.start[request],
         np.maximum(frames.end[request], frames.end[last]),
@@ -272,14 +364,14 @@ def placed(
         np.where(answered, gap + held_back[request], NONE),
         attempt.astype(np.int32),
         np.where(attempt > 1, tx + first, NONE),
-        np.where(answered, frames.error[last], 0).astype(np.uint16),
-        frames.names,
+        error.astype(np.uint16),
+        names,
     )
-    rows = 1 + answered.astype(np.int64)
+    rows = 1 + (answered | garbled).astype(np.int64)
     exchange = np.repeat(place, rows)
     is_answer = np.arange(len(exchange)) != (np.cumsum(rows) - rows)[exchange]
     station = unit[exchange].astype(np.int16)
-    asked = np.where(answered | found.unanswered[which], _REQUEST, TO_ALL)[exchange]
+    asked = np.where(answered | garbled | found.unanswered[which], _REQUEST, TO_ALL)[exchange]
     placements = PlacementColumns(
         number[exchange],
         np.where(is_answer, _RESPONSE, asked).astype(np.uint8),
@@ -287,3 +379,13 @@ def placed(
         np.where(is_answer, NONE, station).astype(np.int16),
     )
     return placements, transactions
+
+
+def _errors(frames: FrameColumns, error: Names, faulty: Masks, request: Times) -> tuple[Names, tuple[str, ...]]:
+    """What is wrong with each exchange, where that of a damaged request is not what its answer says; the texts."""
+    said = np.flatnonzero(faulty & (error == 0))
+    if not len(said):
+        return error, frames.names
+    faults, which = np.unique(frames.error[request[said]], return_inverse=True)
+    error[said] = len(frames.names) + which
+    return error, (*frames.names, *(damaged_request(frames.names[fault]) for fault in faults.tolist()))

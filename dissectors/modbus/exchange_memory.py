@@ -97,7 +97,7 @@ def holding(
     begin = int(np.searchsorted(found.run, found.run[place]))
     warm = SAMPLES + (place if since is None else since) - begin
     end = _first_late(found, place, end, warm, known, LearnedTiming(timing).tolerance)
-    while end > place and found.unanswered[end - 1]:  # it closes with the next request
+    while end > place and (found.unanswered[end - 1] or found.garbled[end - 1]):  # it closes with the next request
         end -= 1
     return end
 
@@ -109,9 +109,10 @@ def _impatient(
     part = slice(place, end)
     gap, answered, unanswered = found.gap[part], found.answered[part], found.unanswered[part]
     low, high = (known.timeout, known.timeout) if known.timeout is not None else (_NEVER, 0)
+    limit = max(7 * timing.char // 2, timing.char + timing.latency, _REPEATED_AT_ONCE)
     if not unanswered.any():
         late: Masks = answered & (gap // 4 + 1 > low // 5)
-        return late
+        return late | _impatient_of_damage(found, place, end, limit, low, high)
     so_far = np.cumsum(unanswered) > unanswered  # a request before it was unanswered
     least = min(known.unanswered, default=_NEVER)
     most = max(known.unanswered, default=0)
@@ -125,9 +126,23 @@ def _impatient(
     pause[1:] *= answered[:-1]
     pauses = np.maximum(np.maximum.accumulate(pause), known.pause)
     enough = slowest + _ANSWER_CHARS * timing.char + pauses * 11 // 10
-    limit = max(7 * timing.char // 2, timing.char + timing.latency, _REPEATED_AT_ONCE)
     usual = (gap > enough) & (gap < GIVE_UP) & (gap // 3 < lows // 2) & (2 * gap >= highs) & (gap >= limit)
     doubtful: Masks = (answered & (gap // 4 + 1 > lows // 5)) | (unanswered & ~usual)
+    return doubtful | _impatient_of_damage(found, place, end, limit, lows, highs)
+
+
+def _impatient_of_damage(
+    found: ExchangeColumns, place: int, end: int, limit: int, low: Times | int, high: Times | int
+) -> Masks:
+    """Which exchanges with a damaged answer do not surely wait for the next request: given up before it, or it may be
+    an echo of theirs. `low`, `high`: the master's timeout at least and at most."""
+    garbled = found.garbled[place:end]
+    if not garbled.any():
+        return garbled
+    gap = found.gap[place:end]
+    again = np.append(found.repeat[place + 1 : end + 1], np.zeros(max(0, end + 1 - len(found)), bool))
+    waits = (gap // 3 < low // 2) & (~again | ((gap >= limit) & (8 * gap >= high)))
+    doubtful: Masks = garbled & ~waits
     return doubtful
 
 
@@ -224,7 +239,7 @@ def heard(went: Passed, place: int, tx: int) -> dict[int, int]:
 def outlives(found: ExchangeColumns, at: int, end: int) -> bool:
     """Whether an exchange before `end` was not answered, and one directly behind it with the same unit was."""
     unit = found.unit[at]
-    while found.unanswered[at] and at + 1 < end and found.unit[at + 1] == unit:
+    while (found.unanswered[at] or found.garbled[at]) and at + 1 < end and found.unit[at + 1] == unit:
         at += 1
         if found.answered[at]:
             return True

@@ -201,6 +201,7 @@ class RtuWindow:
         if request and (repair.flaw in _ALL_AGREES or self.past.has_asked(whole)):
             response = any(r.response for r in fits) or is_open_length(whole)
             self.expected = expectation(self.expected, whole, request, response)
+            self.past.note(whole, request=True)  # as its answer would, where that may be a request itself
 
     def _note_stray_zeros(self, count: int) -> None:
         """Zeros follow a frame: they teach where no well-formed frame ends with them."""

@@ -121,7 +121,7 @@ class TrackerMemory:
     def pass_by(self, went: Passed, by: PassedBy) -> None:
         """Go on as if it had tracked exchanges that went by."""
         first = by.first
-        self._learn_from_next(first, first.header.role is not Role.EITHER)
+        self._learn_from_next(first, first.header.ok and first.header.role is not Role.EITHER)
         for (unit, pace), times in went.times.items():
             self.learnt.answered_often(unit, pace, times)
         self.learnt.paused_often(went.pauses)

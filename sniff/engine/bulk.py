@@ -225,11 +225,11 @@ class _Leg:
         table, given, make = whole.table, whole.given, self.dissector.pairing
         if make is None:
             return self._placed(list(table.rows()))
-        pairing = make(self._tracker, whole.by_kernel, table.octets, self.timing, table.slack)
+        pairing = make(self._tracker, whole.to_pair, table.octets, self.timing, table.slack)
         placing, rows, place = Placing(table), RowsAhead(table), 0
         while place < len(table):
             row = given.get(place)
-            run = pairing.run(place, table.first + place) if row is None else None
+            run = pairing.run(place, table.first + place) if row is None or place not in table.odd else None
             if run is None:
                 placing.add(place, *self._track(row or rows.at(place)))
                 place += 1

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dissectors.columns import NONE, FrameColumns, Masks, PlacementColumns
+from dissectors.columns import NONE, UNSAID, FrameColumns, Masks, PlacementColumns
 from dissectors.frame import Event, Frame
 from dissectors.manifest import Dissector
 from sniff.engine.engine import Row
@@ -24,12 +24,13 @@ class Gathered:
     given: dict[int, Row]
 
     @property
-    def by_kernel(self) -> FrameColumns:
-        """The columns, where nothing but the frames of the kernel is said to be good: what pairing may look at."""
+    def to_pair(self) -> FrameColumns:
+        """The columns as a pairing is handed them."""
         frames = self.table.frames
-        if not self.given:
+        if not self.table.odd:
             return frames
-        return replace(frames, ok=frames.ok & ~_mask(len(frames), self.given))
+        odd = _mask(len(frames), self.table.odd)
+        return replace(frames, ok=frames.ok & ~odd, damage=np.where(odd, np.uint8(UNSAID), frames.damage))
 
 
 def gathered(dissector: Dissector, first: int, stretches: Sequence[Stretch], late: LateColumns) -> Gathered:
@@ -105,7 +106,7 @@ def _octets(stretch: Stretch) -> np.ndarray[tuple[int], np.dtype[np.uint8]]:
     return stretch.octets[int(columns.offset[stretch.begin]) : int(columns.offset[last]) + int(columns.length[last])]
 
 
-def _mask(count: int, places: Sequence[int] | dict[int, Row]) -> Masks:
+def _mask(count: int, places: Sequence[int] | Mapping[int, Row]) -> Masks:
     mask: Masks = np.zeros(count, bool)
     mask[list(places)] = True
     return mask

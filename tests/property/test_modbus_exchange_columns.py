@@ -42,7 +42,10 @@ def memory(tracker: ModbusTracker) -> dict[str, object]:
     """All that it remembers, in values that compare."""
 
     def of(exchange: Exchange | None) -> object:
-        return exchange and (exchange.tx, exchange.octets, exchange.request, exchange.answered, exchange.copied)
+        return exchange and (
+            *(exchange.tx, exchange.octets, exchange.request, exchange.fault, exchange.answered),
+            exchange.copied,
+        )
 
     learnt = tracker.learnt
     return {
@@ -161,6 +164,7 @@ def _compare(
         request = Exchange(
             before.next_tx + one - place, seen[int(found.request[one]) - first + at], bool(found.sure[one])
         )
+        request.fault = request.request.header.error if found.faulty[one] else None
         request.answered = bool(found.answered[one])
         request.outlives = outlives(found, one, end)
         request.waited = int(found.gap[one]) if found.unanswered[one] else None
@@ -235,7 +239,7 @@ def said(seed: int, count: int, *, lost: float = 0.0, spread: int = 6) -> list[t
         if dice.random() >= lost:
             frames.append((rtu(answered), wait))
             continue
-        fault = dice.randrange(7)
+        fault = dice.randrange(10)
         if fault == 0:
             frames.append((rtu(asked), 300 * MS))
             frames.append((rtu(answered), wait))
@@ -249,7 +253,20 @@ def said(seed: int, count: int, *, lost: float = 0.0, spread: int = 6) -> list[t
             frames.append((rtu(answered), wait * dice.choice((3, 10))))
         elif fault == 5:
             frames.append((rtu(bytes((9,)) + answered[1:]), wait))
+        elif fault == 6:
+            frames.append((_spoilt(rtu(answered), dice), wait))
+        elif fault == 7:
+            frames[-1] = _spoilt(rtu(asked), dice), pause
+            frames.append((rtu(answered), wait))
+        elif fault == 8:  # asked again, after a damaged answer, sooner or later
+            frames += [(_spoilt(rtu(answered), dice), wait), (rtu(asked), dice.choice((3, 40, 70, 300, 4000)) * MS)]
+            frames.append((rtu(answered), wait))
     return frames
+
+
+def _spoilt(octets: bytes, dice: random.Random) -> bytes:
+    at = dice.randrange(len(octets))
+    return octets[:at] + bytes((octets[at] ^ dice.randint(1, 255),)) + octets[at + 1 :]
 
 
 def with_dead_station(seed: int, count: int, repeats: int, timeout: int, jitter: int) -> list[tuple[bytes, int]]:
@@ -331,8 +348,7 @@ def test_of_the_bulk_bus(timing: Timing) -> None:
             Chunk(time, octets[a:b]) for time, a, b in zip(reads.times.tolist(), begins[:-1], begins[1:], strict=True)
         ]
         by_columns, total = assert_paired_equally(chunks, timing)
-        if not share:
-            assert by_columns >= 0.95 * total
+        assert by_columns >= (0.95 if share < 0.05 else 0.7) * total
 
 
 @pytest.mark.parametrize(
