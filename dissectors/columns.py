@@ -370,6 +370,8 @@ class Remembering(Protocol):
     def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets) -> None:
         """Go on with the memory of an earlier framer, and with what `frames` teach, which came after what it gave.
 
+        Without frames what it waits for comes next, or a request does.
+
         `octets`: where `frames.offset` counts.
         """
         ...

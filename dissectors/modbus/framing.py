@@ -125,6 +125,7 @@ class RtuFramer:
 
         assert isinstance(earlier, RtuFramer)
         self._window.past, self._window.units = earlier._window.past, earlier._window.units
+        self._window.expected = None if len(frames) else earlier._window.expected
         learn(self._window.past, self._window.units, frames, octets)
 
     # --- when to decide --------------------------------------------------------------------------------------------

@@ -124,6 +124,19 @@ class _AnotherReadingError(Exception):
     """A framer that was handed the last rows of a chain goes over its end."""
 
 
+@dataclass(frozen=True, slots=True)
+class _TakenUp:
+    """A chain that was taken up behind `row`, up to `end`, as the stretch of that number; and what the reference had
+    come to: its framer, which had been fed up to `fed`, and the events that it had given behind the row."""
+
+    row: int
+    end: int
+    stretch: int
+    framer: Framer
+    following: list[Event]
+    fed: int
+
+
 class _Work:
     """One block on its way."""
 
@@ -140,7 +153,7 @@ class _Work:
             self._columns, self._last = _chains(self._columns, self._size - MARGIN)
         self._stretches: list[Stretch] = []
         self._events: list[Event] = []
-        self._taken = (0, 0, 0)  # of the newest chain: its row that the reference gave, its end, its stretch
+        self._newest: _TakenUp | None = None
         self._doubted = 0  # no chain is taken up before this place
 
     def run(self) -> list[Stretch]:
@@ -167,19 +180,20 @@ class _Work:
         """Keep events of a framer that has been fed up to a place of the block; where a chain is taken up, the place in
         the block where it ends."""
         framing = self._framing
-        for event in events:
+        for number, event in enumerate(events, 1):
             begin = framing._given - framing._base
             framing._given += len(event.octets)
             self._events.append(event)
             if begin >= self._doubted and isinstance(event, Frame) and event.ok and self._columns is not None:
                 row = int(np.searchsorted(self._columns.offset, begin))
                 if row < len(self._columns) and self._columns.offset[row] == begin:
-                    end = self._take_up(row, event, fed)
+                    end = self._take_up(row, event, fed, events[number:])
                     if end is not None:
                         return end
         return None
 
-    def _take_up(self, row: int, event: Frame, fed: int) -> int | None:
+    def _take_up(self, row: int, event: Frame, fed: int, following: list[Event]) -> int | None:
+        """Take up the chain behind a row that the reference gave as `event`, and `following` behind it."""
         columns, last = self._columns, self._last
         assert columns is not None
         assert last is not None
@@ -188,42 +202,43 @@ class _Work:
             return None
         if int(columns.offset[end - 1]) + int(columns.length[end - 1]) <= fed:  # the framer has read it all already
             return None
+        earlier = self._framing._framer
         for primed in (*PRIMED, end - row):
-            first = self._with_request(row, max(row, end - primed))
-            if self._prime(slice(row + 1, max(row + 1, first)), slice(first, end)):
+            first = self._with_request(row, max(row, end - primed), not following)
+            if first is not None and self._prime(slice(row + 1, max(row + 1, first)), slice(first, end)):
                 self._end_events()
-                self._taken = row, end, len(self._stretches)
+                self._newest = _TakenUp(row, end, len(self._stretches), earlier, following, fed)
                 self._stretches.append(Clean(columns, self._reads.octets, row + 1, end))
                 stop = int(columns.offset[end - 1]) + int(columns.length[end - 1])
                 self._framing._given = self._framing._base + stop
                 return stop
         return None
 
-    def _with_request(self, row: int, first: int) -> int:
-        """From which row on a framer that remembers is to be handed rows: the last request up to `first`, else `row`,
-        so that it knows what an answer answers."""
+    def _with_request(self, row: int, first: int, is_newest: bool) -> int | None:
+        """From which row on a framer that remembers is to be handed rows: the last request up to `first`, so that it
+        knows what an answer answers. Where there is none, from the one behind `row`, with what the earlier framer waits
+        for; None where that one has gone on already."""
         columns = self._columns
         assert columns is not None
         if not isinstance(self._framing._framer, Remembering):
             return first
         asked = np.flatnonzero(columns.role[row : first + 1] == _REQUEST)
-        return row + int(asked[-1]) if len(asked) else row
+        if len(asked):
+            return row + int(asked[-1])
+        return row + 1 if is_newest else None
 
     def _give_back(self) -> int:
         """Let the reference read the newest chain after all; where it goes on in the block."""
-        columns, framing = self._columns, self._framing
-        row, end, stretch = self._taken
+        columns, framing, newest = self._columns, self._framing, self._newest
         assert columns is not None
-        self._doubted = int(columns.offset[end - 1]) + int(columns.length[end - 1])
-        del self._stretches[stretch:]
-        self._events = []
-        begin, length = int(columns.offset[row]), int(columns.length[row])
-        framer = framing._dissector.framer(framing._timing)
-        if isinstance(framer, Remembering):
-            framer.remember(framing._framer, columns.take(slice(0, 0)), self._reads.octets)
-        framing._framer, framing._known = framer, length
-        framing._given = framing._base + begin + length
-        return begin
+        assert newest is not None
+        self._doubted = int(columns.offset[newest.end - 1]) + int(columns.length[newest.end - 1])
+        del self._stretches[newest.stretch :]
+        self._events = newest.following
+        framing._framer, framing._known = newest.framer, 0
+        behind = int(columns.offset[newest.row]) + int(columns.length[newest.row])
+        framing._given = framing._base + behind + sum(len(event.octets) for event in newest.following)
+        return newest.fed
 
     def _prime(self, known: slice, handed: slice) -> bool:
         """Put a new framer behind rows of the kernel, of which it is handed the last; whether it makes the same of them
