@@ -15,10 +15,12 @@ _IS_KNOWN = np.array([code & ~EXCEPTION_BIT in FUNCTIONS and not code & EXCEPTIO
 
 
 class LearntLengths:
-    """Answers by station, function and length that were noted already, ascending."""
+    """What was noted already: answers by station, function and length, ascending; by station and function, whether
+    there were requests."""
 
     def __init__(self) -> None:
         self.answers: npt.NDArray[np.int64] = np.zeros(0, np.int64)
+        self.calls = np.zeros(1 << 16, bool)
 
 
 def learn(past: Past, units: set[int], frames: FrameColumns, octets: Octets) -> None:
@@ -39,8 +41,11 @@ def learn(past: Past, units: set[int], frames: FrameColumns, octets: Octets) -> 
     if not len(begins):
         return
     if _IS_KNOWN[octets[begins + 1]].all():
-        calls = np.unique(octets[begins].astype(np.int64) << 8 | octets[begins + 1])
-        past.note_requests(len(begins), _newest(octets, begins, lengths), calls.tolist())
+        calls = octets[begins].astype(np.int64) << 8 | octets[begins + 1]
+        known = _learnt(past)
+        fresh = calls[~known.calls[calls]]
+        known.calls[fresh] = True
+        past.note_requests(len(begins), _newest(octets, begins, lengths), set(fresh.tolist()))
         return
     for one in _each(octets, begins, lengths):
         past.note(one, request=True)
@@ -66,15 +71,23 @@ def _each(octets: Octets, begins: Times, lengths: Times) -> list[bytes]:
 
 def _new_answers(past: Past, octets: Octets, begins: Times, lengths: Times) -> list[int]:
     """The first place of each station, function and length that was not there before."""
-    known = past.learnt if past.only_gathers and isinstance(past.learnt, LearntLengths) else LearntLengths()
-    past.learnt = known
+    known = _learnt(past)
+    if not past.only_gathers:
+        known.answers = np.zeros(0, np.int64)
     keys = octets[begins].astype(np.int64) << 24 | octets[begins + 1].astype(np.int64) << 16 | lengths
     places = np.flatnonzero(~_is_among(keys, known.answers))
+    if not len(places):
+        return []
     distinct, first = np.unique(keys[places], return_index=True)
-    if len(distinct):
-        known.answers = np.union1d(known.answers, distinct)
+    known.answers = np.union1d(known.answers, distinct)
     found: list[int] = places[first].tolist()
     return found
+
+
+def _learnt(past: Past) -> LearntLengths:
+    if not isinstance(past.learnt, LearntLengths):
+        past.learnt = LearntLengths()
+    return past.learnt
 
 
 def _is_among(values: npt.NDArray[np.integer], ascending: npt.NDArray[np.integer]) -> npt.NDArray[np.bool_]:

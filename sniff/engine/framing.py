@@ -29,7 +29,7 @@ LEAST = 1536
 SHORTEST = 3
 """Rows that a chain must still hold for it to be worth taking up."""
 
-PRIMED = (6, 100)
+PRIMED = (2, 6, 100)
 """Rows of a chain that a new framer is handed first; more where it makes something else of the fewer."""
 
 
