@@ -365,7 +365,10 @@ class Pairing(Protocol):
 
 @runtime_checkable
 class Remembering(Protocol):
-    """A framer that weighs octets by what it remembers of the bus."""
+    """A framer that weighs octets by what it remembers of the bus. `primed`: how many of the last rows of a chain tell
+    it all that it has not been told."""
+
+    primed: int
 
     def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets) -> None:
         """Go on with the memory of an earlier framer, and with what `frames` teach, which came after what it gave.

@@ -61,6 +61,7 @@ class AsciiFramer:
     """Characters and times in, ASCII frames and noise out. `Frame.octets` are the characters as they came."""
 
     protocol = "modbus-ascii"
+    primed = 6
 
     def __init__(self, timing: Timing) -> None:
         self._window = OctetWindow(timing)

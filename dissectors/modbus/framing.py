@@ -72,6 +72,7 @@ class RtuFramer:
     """
 
     protocol = "modbus-rtu"
+    primed = 2  # an exchange: all else it is told
 
     def __init__(self, timing: Timing) -> None:
         self.hold = max(2 * timing.t35, timing.latency, _HOLD)

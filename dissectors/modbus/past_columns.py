@@ -7,10 +7,11 @@ import numpy.typing as npt
 
 from dissectors.columns import ROLES, FrameColumns, Octets, Times
 from dissectors.frame import Role
-from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
+from dissectors.modbus.functions import ANSWER_LENGTHS, EXCEPTION_BIT, FUNCTIONS, answer_length
 from dissectors.modbus.past import MOST_REQUESTS, Past
 
-_RESPONSE = ROLES.index(Role.RESPONSE)
+_REQUEST, _RESPONSE, _EITHER = (ROLES.index(role) for role in (Role.REQUEST, Role.RESPONSE, Role.EITHER))
+_LENGTH_VARIES = np.array([code in FUNCTIONS and code not in ANSWER_LENGTHS for code in range(256)])
 _IS_KNOWN = np.array([code & ~EXCEPTION_BIT in FUNCTIONS and not code & EXCEPTION_BIT for code in range(256)])
 
 
@@ -26,8 +27,8 @@ class LearntLengths:
 def learn(past: Past, units: set[int], frames: FrameColumns, octets: Octets) -> None:
     """Note what good frames teach: the same as one after the other, but for how stray zeros are forgotten.
 
-    `octets`: where `frames.offset` counts. A frame that may be either, as the confirmation of a write, teaches nothing
-    that its request has not.
+    `octets`: where `frames.offset` counts. A frame that may be either is noted as a request, as the confirmation of a
+    write always is, unless it is the answer to the request directly before it.
     """
     fine = np.flatnonzero(frames.ok & (frames.length >= 4))
     if not len(fine):
@@ -35,6 +36,7 @@ def learn(past: Past, units: set[int], frames: FrameColumns, octets: Octets) -> 
     begins, lengths = frames.offset[fine], frames.length[fine].astype(np.int64)
     units.update(np.flatnonzero(np.bincount(octets[begins])).tolist())
     is_answer = frames.role[fine] == _RESPONSE
+    is_answer[_answers_of_either_shape(frames, octets, fine)] = True
     for row in _new_answers(past, octets, begins[is_answer], lengths[is_answer]):
         past.note(_octets_of(frames, octets, int(fine[is_answer][row])), request=False)
     begins, lengths = begins[~is_answer], lengths[~is_answer]
@@ -49,6 +51,20 @@ def learn(past: Past, units: set[int], frames: FrameColumns, octets: Octets) -> 
         return
     for one in _each(octets, begins, lengths):
         past.note(one, request=True)
+
+
+def _answers_of_either_shape(frames: FrameColumns, octets: Octets, fine: Times) -> list[int]:
+    """Places in `fine` of frames that have the length of a request, too, as the state of 17 coils, and answer one."""
+    code = octets[frames.offset[fine] + 1]
+    answers = []
+    for place in np.flatnonzero((frames.role[fine] == _EITHER) & _LENGTH_VARIES[code]).tolist():
+        asked, row = int(fine[place - 1]), int(fine[place])
+        if not place or frames.role[asked] != _REQUEST:
+            continue
+        request, answer = _octets_of(frames, octets, asked), _octets_of(frames, octets, row)
+        if request[:2] == answer[:2] and answer_length(request) == len(answer):
+            answers.append(place)
+    return answers
 
 
 def _newest(octets: Octets, begins: Times, lengths: Times) -> list[bytes]:

@@ -22,7 +22,7 @@ from dissectors.modbus.damaged import (
     predicted,
     zeros_at_start,
 )
-from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, is_open_length
+from dissectors.modbus.functions import ANSWER_LENGTHS, BROADCAST, EXCEPTION_BIT, is_open_length
 from dissectors.modbus.open_request import Expected, expectation
 from dissectors.modbus.past import Past
 from dissectors.modbus.repair import repaired
@@ -150,7 +150,8 @@ class RtuWindow:
         self.good_before = True
         self.expected = expectation(self.expected, octets, request, response)
         to_all = octets[0] == BROADCAST and not octets[1] & EXCEPTION_BIT  # nobody answers for all
-        self.past.note(octets, self.expected is not None or not response or to_all)
+        confirms = request and response and octets[1] in ANSWER_LENGTHS  # it says again what was asked
+        self.past.note(octets, self.expected is not None or not response or to_all or confirms)
         self._last_good = octets
         self.units.add(octets[0])
 
@@ -201,7 +202,6 @@ class RtuWindow:
         if request and (repair.flaw in _ALL_AGREES or self.past.has_asked(whole)):
             response = any(r.response for r in fits) or is_open_length(whole)
             self.expected = expectation(self.expected, whole, request, response)
-            self.past.note(whole, request=True)  # as its answer would, where that may be a request itself
 
     def _note_stray_zeros(self, count: int) -> None:
         """Zeros follow a frame: they teach where no well-formed frame ends with them."""

@@ -44,6 +44,7 @@ class N2Framer:
     """Octets and times in, N2 frames and noise out."""
 
     protocol = "n2"
+    primed = 6
 
     def __init__(self, timing: Timing) -> None:
         self._window = OctetWindow(timing)

@@ -48,6 +48,8 @@ _CHECKED = frozenset((SD1, SD2, SD3))
 class ProfibusFramer(PlainFramer):
     """The framer of one bus."""
 
+    primed = 6  # tokens and requests of several masters
+
     def __init__(self, timing: Timing) -> None:
         super().__init__(timing, "profibus", SILENCE)
         self._masters: set[int] = set()

@@ -29,8 +29,9 @@ LEAST = 1536
 SHORTEST = 3
 """Rows that a chain must still hold for it to be worth taking up."""
 
-PRIMED = (2, 6, 100)
-"""Rows of a chain that a new framer is handed first; more where it makes something else of the fewer."""
+PRIMED, MANY = 6, 100
+"""Rows of a chain that a new framer is handed first, unless it remembers more; where it makes something else of the
+fewer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +204,8 @@ class _Work:
         if int(columns.offset[end - 1]) + int(columns.length[end - 1]) <= fed:  # the framer has read it all already
             return None
         earlier = self._framing._framer
-        for primed in (*PRIMED, end - row):
+        few = earlier.primed if isinstance(earlier, Remembering) else PRIMED
+        for primed in (few, MANY, end - row):
             first = self._with_request(row, max(row, end - primed), not following)
             if first is not None and self._prime(slice(row + 1, max(row + 1, first)), slice(first, end)):
                 self._end_events()
