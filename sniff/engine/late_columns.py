@@ -28,6 +28,7 @@ class LateColumns:
         self._pauses = np.full(0, -1, np.int64)
         self._latencies = np.zeros(0, np.int64)
         self._is_late = np.zeros(0, bool)
+        self._is_plain = False  # no read is long, none tells a latency that is not allowed for already
 
     @classmethod
     def after(cls, earlier: LateReads, timing: Timing) -> Self:
@@ -52,25 +53,36 @@ class LateColumns:
         runs = times - lasted - before > self._together
         if not known:
             runs[0] = True
-        run_before = np.where(runs, before, 0)
-        at = np.maximum.accumulate(np.where(runs, np.arange(len(reads)), -1))
-        run_before = np.where(at >= 0, run_before[np.maximum(at, 0)], self._before_run)
         starts = np.maximum(times - lasted, before)
         if not known:
             starts[0] = times[0] - lasted[0]
-        pauses = np.minimum(starts - run_before, MOST)
         long = lasted > self._least
         long[0] &= known
-        self._before_run = int(run_before[-1])
+        pauses = self._pauses_before(np.flatnonzero(long), np.flatnonzero(runs), before, starts)
         latencies = self._follow(reads, before, known)
         self._times = np.concatenate((self._times[-KEPT:], times))
         self._starts = np.concatenate((self._starts[-KEPT:], starts))
-        self._pauses = np.concatenate((self._pauses[-KEPT:], np.where(long, pauses, -1)))
+        self._pauses = np.concatenate((self._pauses[-KEPT:], pauses))
         self._latencies = np.concatenate((self._latencies[-KEPT:], latencies))
         self._is_late = np.concatenate((self._is_late[-KEPT:], np.zeros(len(reads), bool)))
+        self._is_plain = int(self._pauses.max()) < 0 and int(self._latencies.max()) <= self._allowed
+
+    def _pauses_before(self, long: Times, runs: Times, before: Times, starts: Times) -> Times:
+        """The pause before each long read, from the run of reads that it ends; -1 of the others. `runs`: which begin
+        one."""
+        pauses = np.full(len(before), -1, np.int64)
+        if len(long):
+            at = runs.searchsorted(long, "right") - 1
+            began = before[runs[np.maximum(at, 0)]] if len(runs) else np.zeros(len(long), np.int64)
+            pauses[long] = np.minimum(starts[long] - np.where(at >= 0, began, self._before_run), MOST)
+        if len(runs):
+            self._before_run = int(before[runs[-1]])
+        return pauses
 
     def slack(self, ends: Times) -> Times:
         """ns, of frames in their order, none of them twice, by when they ended; their reads were seen."""
+        if self._is_plain:
+            return np.full(len(ends), self._allowed, np.int64)
         read = places_in(self._times, ends)
         inside = read < len(self._times)
         read = np.minimum(read, len(self._times) - 1)
