@@ -206,8 +206,10 @@ def _miscounted(name: str, station: StationRecord) -> Finding | None:
     """Checks that are always wrong, in frames that are right otherwise."""
     always: dict[int, Tally] = {}  # the commonest difference among frames of one length
     for (difference, octets), wrong in station.wrong_checks.items():
+        if not octets:  # many others, each of its own
+            continue
         begun_with_0 = difference == int.from_bytes(crc16_modbus(bytes(octets - 2)).to_bytes(2, "little"), "big")
-        is_system = octets and (len(wrong.right) > 1 or begun_with_0)  # the same octets again may be spoilt alike
+        is_system = len(wrong.right) > 1 or begun_with_0  # the same octets again may be spoilt alike
         if is_system and (octets not in always or wrong.tally.count > always[octets].count):
             always[octets] = wrong.tally
     same = [tally for tally in always.values() if tally.count >= _SYSTEM_LEAST]
