@@ -12,25 +12,26 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from dissectors.field_types import FieldTypes
-from dissectors.findings import Judge, Rule
-from dissectors.frame import Frame, Header, Role
-from dissectors.framer import Framer
-from dissectors.line import Timing
-from dissectors.meaning import Meaning, PlaceName, Spans, plain_place
-from dissectors.pseudonyms import Renamer
-from dissectors.questions import Questions
-from dissectors.readings import Asks, Readings, Refusal
-from dissectors.token_ring import TokenRing
-from dissectors.tracker import Tracker
+from dissectors.readings import plain_place
 
 if TYPE_CHECKING:
-    # columns need numpy, which takes longer to import than a small capture to read; simulated buses are seldom wanted
+    # a protocol imports what it has of all this; columns need numpy, which takes longer than to read a small capture
     from dissectors.columns import Kernel, Pairing
+    from dissectors.field_types import FieldTypes
+    from dissectors.findings import Judge, Rule
+    from dissectors.frame import Frame, Header, Role
+    from dissectors.framer import Framer
+    from dissectors.line import Timing
+    from dissectors.meaning import Meaning, Spans
+    from dissectors.pseudonyms import Renamer
+    from dissectors.questions import Questions
     from dissectors.reading_columns import BulkReadings
+    from dissectors.readings import Asks, PlaceName, Readings, Refusal
     from dissectors.register_maps import MapReader
     from dissectors.simulated import SimulatedBus
     from dissectors.stencil import Stencils
+    from dissectors.token_ring import TokenRing
+    from dissectors.tracker import Tracker
 
 RARE_BITS = 8.0
 """Evidence of a good frame where its protocol does not say: one in 256 of random octets."""

@@ -14,17 +14,13 @@ from dissectors.profiles.brief_words import say_briefly
 from dissectors.profiles.decoding import Value, brief_title, decode, number, said_title, say
 from dissectors.profiles.model import Entry, Profile
 from dissectors.profiles.properties import due_property
-from dissectors.readings import Reading
+from dissectors.readings import PlaceName, Reading
 
 Span = tuple[int, int]
 """Octets of a frame: the first, and the one behind the last."""
 
 Spans = Callable[[Frame, Sequence[Reading]], Sequence[Span | None]]
 """Where each reading of a frame stands in its octets (`Dissector.spans`)."""
-
-PlaceName = Callable[[Reading, str, int], str]
-"""(reading, number, offset) → its place in words: `Register 2524h (wire 0x2524)`. `number`: the manual's, empty without
-a profile; `offset`: the wire's number less the manual's (`Dissector.place`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,11 +217,6 @@ def _parts(entry: Entry, values: Sequence[Value]) -> tuple[tuple[str, str], ...]
         words = f"{value.raw} ({value.words})" if value.words else f"{value.raw}"
         parts.append((f"bits {part.high:X}-{part.low:X} {part.name}", words))
     return tuple(parts)
-
-
-def plain_place(reading: Reading, number: str, offset: int) -> str:
-    """The place of what has a kind and a number: `AI 3`, `analog-value 1 units`."""
-    return f"{reading.space} {reading.address} {reading.part.replace('.', ' ')}".rstrip()
 
 
 RUN = 3

@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from dissectors.frame import Frame, Header, Role
-from dissectors.manifest import Dissector
-from dissectors.meaning import Meaning
 
 if TYPE_CHECKING:
+    from dissectors.manifest import Dissector
+    from dissectors.meaning import Meaning
     from dissectors.simulated import SimulatedBus
 
 LONGEST = 120

@@ -54,3 +54,12 @@ them, empty where they are to be read."""
 
 Refusal = Callable[[Frame], tuple[str, int] | None]
 """frame → the family of its codes ("modbus", "n2") and the code, when it refuses a request (`Dissector.refusal`)."""
+
+PlaceName = Callable[[Reading, str, int], str]
+"""(reading, number, offset) → its place in words: `Register 2524h (wire 0x2524)`. `number`: the manual's, empty without
+a profile; `offset`: the wire's number less the manual's (`Dissector.place`)."""
+
+
+def plain_place(reading: Reading, number: str, offset: int) -> str:
+    """The place of what has a kind and a number: `AI 3`, `analog-value 1 units`."""
+    return f"{reading.space} {reading.address} {reading.part.replace('.', ' ')}".rstrip()

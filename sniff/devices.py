@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dissectors.installed import entry_points
-from dissectors.profiles import Devices, Profile, ProfileError, packaged, parse_text
-from dissectors.profiles.packaged import SUFFIX, names
-from sniff.config import nearest
+from dissectors.profiles import Devices, ProfileError
+from dissectors.profiles.model import Profile
+from dissectors.profiles.packaged import SUFFIX, names, packaged, parse_text
 from sniff.engine.session import DEVICES_NOTE, Session
 
 if TYPE_CHECKING:
@@ -72,6 +72,8 @@ def find(name: str) -> Profile:
     for point in entry_points(group=GROUP):
         if point.name == name:
             return _plugged(point)
+    from sniff.config import nearest  # for who made a mistake
+
     known = tuple(dict.fromkeys(listed.name for listed in available()))
     raise UnknownProfile(f"profile {name!r}: no such profile{nearest(name, known)}")
 

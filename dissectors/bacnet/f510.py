@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dissectors.bacnet.application import Device, Thing, supported, thing
 from dissectors.bacnet.values import Enumerated, ObjectId
-from dissectors.profiles import packaged
+from dissectors.profiles.packaged import packaged
 
 VENDOR = 461
 

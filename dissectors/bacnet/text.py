@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dissectors.bacnet import message as messages
 from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet.apdu import Apdu, PduType, reason_text
-from dissectors.bacnet.codec import Decoded
 from dissectors.bacnet.content import reply_flaw
 from dissectors.bacnet.frame_types import PROPRIETARY, FrameType
 from dissectors.bacnet.header import error_text
 from dissectors.bacnet.limits import BROADCAST
-from dissectors.bacnet.message import Message
 from dissectors.bacnet.station_address import remote
 from dissectors.bacnet.values import ConstructedValue, escape, show, show_tag
-from dissectors.frame import Assembly, Frame, Header, Role
-from dissectors.meaning import Meaning
+
+if TYPE_CHECKING:
+    from dissectors.bacnet.codec import Decoded
+    from dissectors.bacnet.message import Message
+    from dissectors.frame import Assembly, Frame, Header, Role
+    from dissectors.meaning import Meaning
 
 LENGTH_MAX = 160
 """Longest line; longer ones end with an ellipsis."""

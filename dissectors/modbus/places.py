@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from dissectors.frame import Frame
-from dissectors.meaning import Span
 from dissectors.modbus.envelope import ASCII_NAME, adu
 from dissectors.readings import Origin, Reading
+
+if TYPE_CHECKING:
+    from dissectors.frame import Frame
+    from dissectors.meaning import Span
 
 _WORDS = {"holding": "Register", "input": "Input register", "coil": "Coil", "discrete": "Discrete input"}
 _FIRST = {"holding": 4, "input": 3}

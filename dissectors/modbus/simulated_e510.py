@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from dissectors.line import NS_PER_S
 from dissectors.modbus.lengths import MAX_FRAME
 from dissectors.modbus.simulated import ILLEGAL_ADDRESS, ModbusServer, Refused
-from dissectors.profiles import packaged
+from dissectors.profiles.packaged import packaged
 from dissectors.simulated import Send
 
 DATA_SETTING, WRITE_MODE = 4, 5  # exception codes of the manual's table beside the standard's 01 … 03

@@ -6,13 +6,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from dissectors.frame import Frame, Header, Role
-from dissectors.meaning import Meaning
 from dissectors.modbus.envelope import readable_adu
 from dissectors.modbus.functions import DIAGNOSTICS, EXCEPTION_BIT, FUNCTIONS
 from dissectors.modbus.header import NO_EXCEPTIONS, exception_name, kind_of
 from dissectors.modbus.layout import DEVICE_ID_CODES, DEVICE_ID_OBJECTS
+
+if TYPE_CHECKING:
+    from dissectors.meaning import Meaning
 
 _MOST_REGISTERS = 10
 _MOST_BITS = 32

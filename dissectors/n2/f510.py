@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dissectors.profiles import Entry, packaged
+from dissectors.profiles.model import Entry
+from dissectors.profiles.packaged import packaged
 
 _AI, _BI, _AO, _BO = 1, 2, 3, 4
 _REGIONS = {"AI": _AI, "BI": _BI, "AO": _AO, "BO": _BO}

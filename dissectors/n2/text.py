@@ -5,9 +5,10 @@ A damaged frame that can be repaired shows what it was, and says so.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from dissectors.checksums import sum8
 from dissectors.frame import Check, Frame, Header, Role
-from dissectors.meaning import Meaning
 from dissectors.n2.commands import NATIVE, UNKNOWN, Command, error_text, fields_of, parse_command
 from dissectors.n2.header import damage_of, error_code
 from dissectors.n2.header import meant as meant_octets
@@ -22,6 +23,9 @@ from dissectors.n2.objects import (
     region_name,
     state_word,
 )
+
+if TYPE_CHECKING:
+    from dissectors.meaning import Meaning
 
 MOST_RAW = 40
 """Characters of an answer that follow what it means."""

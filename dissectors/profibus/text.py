@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from dissectors.checksums import sum8
 from dissectors.frame import Check, Frame, Header, Role
-from dissectors.meaning import Meaning
 from dissectors.profibus.configuration import parse_configuration
 from dissectors.profibus.control import FDL_STATUS, Control
 from dissectors.profibus.diagnosis import NO_MASTER, parse_diagnosis
@@ -15,6 +15,9 @@ from dissectors.profibus.header import damage_of, meant, refusal_words
 from dissectors.profibus.parameters import parse_global_control, parse_new_address, parse_parameters
 from dissectors.profibus.services import ACYCLIC, Service, service_of
 from dissectors.profibus.telegram import BROADCAST, Telegram, body_of, parse
+
+if TYPE_CHECKING:
+    from dissectors.meaning import Meaning
 
 
 def text(frame: Frame, header: Header, role: Role) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
@@ -150,6 +149,8 @@ class CheckedTable:
         """Complain of the first key that nobody asked for."""
         for key in self.data:
             if key not in self._asked:
+                import difflib  # for who made a mistake
+
                 close = difflib.get_close_matches(key, self._asked, 1, 0.5)
                 hint = f"; did you mean {close[0]!r}?" if close else f"; known: {', '.join(sorted(self._asked))}"
                 raise self.error(key, f"unknown key{hint}")

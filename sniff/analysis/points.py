@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
-from dissectors.profiles import Entry
 from dissectors.profiles.decoding import Quality
+from dissectors.profiles.model import Entry
 from dissectors.readings import Origin
 from sniff.analysis.point_reader import Sample
 

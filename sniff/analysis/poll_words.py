@@ -9,8 +9,9 @@ from enum import Enum
 from itertools import pairwise
 
 from dissectors.line import NS_PER_S
-from dissectors.profiles import Devices, Profile
+from dissectors.profiles import Devices
 from dissectors.profiles.decoding import plain_name
+from dissectors.profiles.model import Profile
 from dissectors.questions import Span
 from dissectors.words import duration
 from sniff.analysis.poll import Poll

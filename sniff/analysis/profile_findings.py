@@ -13,8 +13,9 @@ from dissectors.findings import Finding, Severity, Tally
 from dissectors.frame import Event, Frame, Header, Role
 from dissectors.line import Timing
 from dissectors.manifest import Dissector
-from dissectors.profiles import Devices, Entry, EntryRole, Profile
+from dissectors.profiles import Devices
 from dissectors.profiles.decoding import Value, bit_words, decode, in_range, number, plain_name, state_words
+from dissectors.profiles.model import Entry, EntryRole, Profile
 from dissectors.profiles.properties import due_property
 from dissectors.readings import Origin, Reading
 from dissectors.row_columns import RowColumns, in_turn

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from dissectors.manifest import Dissector
-from dissectors.profiles import Profile, Sign
 from dissectors.profiles.decoding import decode, in_range
+from dissectors.profiles.model import Profile, Sign
 from dissectors.readings import Reading
 from dissectors.tracker import Verdict
 from sniff.analysis.point_reader import PointReader

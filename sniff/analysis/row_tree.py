@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from dissectors.frame import Frame
-from dissectors.manifest import Dissector
-from dissectors.meaning import Meaning
-from dissectors.tracker import Transaction
 from dissectors.words import milliseconds
 from sniff.analysis.packet_tree import Field, fields_of
 from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.wording import duration, mark_names
-from sniff.engine.engine import Row
+
+if TYPE_CHECKING:
+    from dissectors.manifest import Dissector
+    from dissectors.meaning import Meaning
+    from dissectors.tracker import Transaction
+    from sniff.engine.engine import Row
 
 _ASIDE = re.compile(r" \([^()]*\)")
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from dissectors import registry
 from dissectors.frame import Event, Frame, LineError, Noise, Place, Role
 from dissectors.line import MS
-from dissectors.manifest import Dissector
-from dissectors.meaning import Meaning
-from dissectors.tracker import Interval
 from dissectors.words import milliseconds
-from sniff.engine.engine import Row
+
+if TYPE_CHECKING:
+    from dissectors.manifest import Dissector
+    from dissectors.meaning import Meaning
+    from dissectors.tracker import Interval
+    from sniff.engine.engine import Row
 
 
 def describe(dissector: Dissector, row: Row, meaning: Meaning | None = None) -> str:

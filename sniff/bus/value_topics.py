@@ -7,7 +7,8 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from dissectors.profiles import Devices, Entry
+from dissectors.profiles import Devices
+from dissectors.profiles.model import Entry
 from sniff.analysis.point_reader import Sample
 from sniff.recording.topics import topic_part
 

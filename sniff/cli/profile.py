@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dissectors.line import MS
-from dissectors.profiles import Entry, Profile, ProfileError
+from dissectors.profiles import ProfileError
 from dissectors.profiles.decoding import number, plain_name, state_words
+from dissectors.profiles.model import Entry, Profile
 from dissectors.profiles.parsing import is_name
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.offline import survey

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from dissectors import registry
-from dissectors.profiles import ProfileError, parse_text
+from dissectors.profiles import ProfileError
+from dissectors.profiles.packaged import parse_text
 from dissectors.profiles.parsing import is_name
 from dissectors.register_maps import NUMBERINGS, TABLES, MapError, MapReader, RegisterMap, document
 from sniff.analysis.sanitizing import sanitized

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from dissectors.meaning import Meaning
 from dissectors.quick_values import quickly_made
 from dissectors.tracker import Transaction
 from sniff.engine.engine import Output, Row
+
+if TYPE_CHECKING:
+    from dissectors.meaning import Meaning
 
 HELD = 20_000
 """Rows held back at most while waiting for the verdict of the oldest."""

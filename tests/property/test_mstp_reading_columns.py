@@ -19,7 +19,8 @@ from dissectors.bacnet.readings import readings
 from dissectors.columns import CHECKS, FrameColumns, Masks, Octets
 from dissectors.frame import Check, Chunk, FoundBy, Frame
 from dissectors.manifest import Dissector
-from dissectors.profiles import Devices, packaged
+from dissectors.profiles import Devices
+from dissectors.profiles.packaged import packaged
 from dissectors.reading_columns import HOWS, ReadingColumns
 from dissectors.readings import Reading
 from sniff.analysis import point_columns

@@ -5,9 +5,9 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dissectors.profiles import packaged
 from dissectors.profiles.brief_words import say_briefly
 from dissectors.profiles.decoding import say
+from dissectors.profiles.packaged import packaged
 from dissectors.readings import Origin, Reading
 
 E510 = packaged("teco-e510")

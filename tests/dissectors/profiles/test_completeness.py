@@ -9,8 +9,8 @@ from types import ModuleType
 
 import pytest
 
-from dissectors.profiles import Profile, packaged
-from dissectors.profiles.model import Entry
+from dissectors.profiles.model import Entry, Profile
+from dissectors.profiles.packaged import packaged
 
 E510, F510, ACN = "teco-e510", "teco-f510", "automationdirect-acn"
 SHORT = {

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dissectors.profiles import Devices, packaged, parse_text
+from dissectors.profiles import Devices
 from dissectors.profiles.decoding import Quality, decode, plain_name, say
+from dissectors.profiles.packaged import packaged, parse_text
 from dissectors.readings import Origin, Reading
 
 E510 = packaged("teco-e510")

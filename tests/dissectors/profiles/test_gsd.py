@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from dissectors.profiles import ProfileError, parse_text
+from dissectors.profiles import ProfileError
+from dissectors.profiles.packaged import parse_text
 from sniff.devices import devices
 
 PUMP = """; made up
@@ -52,7 +53,7 @@ def test_a_gsd_file_without_name_or_ident_is_no_profile(text: str) -> None:
 
 
 def test_words_of_the_drive_have_its_own_lists() -> None:
-    from dissectors.profiles import packaged
+    from dissectors.profiles.packaged import packaged
 
     drive = packaged("teco-f510")
     fault, alarm = drive.at("dp-input", 1), drive.at("dp-input", 8)

@@ -10,7 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import dissectors.profiles
-from dissectors.profiles import Access, EntryRole, Kind, Limits, Profile, ProfileError, parse, parse_text
+from dissectors.profiles import ProfileError
+from dissectors.profiles.model import Access, EntryRole, Kind, Limits, Profile
+from dissectors.profiles.packaged import parse_text
+from dissectors.profiles.parsing import parse
 
 HEAD = 'name = "pump"\ntitle = "A pump"\nprotocols = ["modbus-rtu"]\n'
 

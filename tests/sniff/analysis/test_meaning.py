@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from dissectors.frame import Frame
-from dissectors.profiles import Devices, packaged
+from dissectors.profiles import Devices
+from dissectors.profiles.packaged import packaged
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
 from sniff.analysis.wording import describe

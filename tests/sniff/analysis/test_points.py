@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
-from dissectors.profiles import Devices, packaged
+from dissectors.profiles import Devices
 from dissectors.profiles.decoding import Quality
+from dissectors.profiles.packaged import packaged
 from dissectors.readings import Origin
 from sniff.analysis.point_reader import PointReader, Sample
 from sniff.analysis.points import Point, PointTable

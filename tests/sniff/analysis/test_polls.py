@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from dissectors.modbus.envelope import seal_rtu
-from dissectors.profiles import Devices, parse_text
+from dissectors.profiles import Devices
+from dissectors.profiles.packaged import parse_text
 from dissectors.questions import Question, Span
 from sniff.analysis.poll import MOST_SLICES, Poll, Slices
 from sniff.analysis.poll_words import ChangeKind, asked, changes, told

@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 
 from dissectors.findings import Finding, Severity
-from dissectors.profiles import Devices, packaged
+from dissectors.profiles import Devices
 from dissectors.profiles.decoding import decode
+from dissectors.profiles.packaged import packaged
 from dissectors.readings import Origin, Reading
 from sniff.analysis.health import health_of
 from sniff.analysis.judging import Judging

@@ -11,7 +11,7 @@ from dissectors.bacnet.envelope import npdu_frame
 from dissectors.bacnet.f510 import f510
 from dissectors.bacnet.readings import readings
 from dissectors.frame import Check, FoundBy, Frame
-from dissectors.profiles import packaged
+from dissectors.profiles.packaged import packaged
 from sniff.analysis.profile_guess import Guess, Guessing, HeardPlaces, guess
 from sniff.bus.offline import outputs
 from sniff.engine.engine import Output

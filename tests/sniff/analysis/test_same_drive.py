@@ -7,7 +7,8 @@ from collections.abc import Callable
 import pytest
 
 from dissectors.line import LineSettings, Timing
-from dissectors.profiles import Devices, packaged
+from dissectors.profiles import Devices
+from dissectors.profiles.packaged import packaged
 from sniff.analysis.point_reader import PointReader
 from sniff.analysis.points import PointTable
 from sniff.bus.offline import outputs

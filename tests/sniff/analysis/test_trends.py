@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from dissectors.profiles import Devices, packaged
+from dissectors.profiles import Devices
+from dissectors.profiles.packaged import packaged
 from sniff.analysis.trends import MOST_VALUES, Trend, Trends
 from sniff.bus.offline import survey
 from sniff.engine.follow_settings import dissector_for

@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
-from dissectors.profiles import Devices, packaged
+from dissectors.profiles import Devices
 from dissectors.profiles.decoding import decode
+from dissectors.profiles.packaged import packaged
 from dissectors.readings import Origin, Reading
 from sniff.analysis.point_reader import Sample
 from sniff.bus import value_topics as value_channels

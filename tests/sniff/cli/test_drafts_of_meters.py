@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from dissectors.profiles import Profile, parse_text
-from dissectors.profiles.model import Entry, Kind
+from dissectors.profiles.model import Entry, Kind, Profile
+from dissectors.profiles.packaged import parse_text
 from sniff.bus.capture_writer import create
 from sniff.engine.session import Session
 from tests.sniff.cli.meters import LINE, STATION, Held, Meter, heard, meters

@@ -15,8 +15,8 @@ import pytest
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from dissectors.modbus.envelope import seal_rtu
-from dissectors.profiles import parse_text
 from dissectors.profiles.model import Kind
+from dissectors.profiles.packaged import parse_text
 from sniff.bus.capture_writer import create
 from sniff.engine.session import Session
 

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from dissectors.modbus.map_home_assistant import read_home_assistant
 from dissectors.modbus.map_tables import read_csv
-from dissectors.profiles import Access, Kind, Profile, parse_text
+from dissectors.profiles.model import Access, Kind, Profile
+from dissectors.profiles.packaged import parse_text
 from dissectors.register_maps import NUMBERINGS, document, kind_of, order_of
 
 Run = Callable[..., Any]

@@ -13,7 +13,8 @@ from typing import Any
 
 from dissectors.frame import Chunk
 from dissectors.line import MS, LineSettings
-from dissectors.profiles import Devices, packaged
+from dissectors.profiles import Devices
+from dissectors.profiles.packaged import packaged
 from sniff.analysis.judging import all_rules
 from sniff.analysis.profile_findings import ProfileFindings
 from sniff.bus.offline import outputs

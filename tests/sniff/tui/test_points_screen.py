@@ -12,7 +12,8 @@ import pytest
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from dissectors.modbus.envelope import seal_rtu
-from dissectors.profiles import Devices, packaged
+from dissectors.profiles import Devices
+from dissectors.profiles.packaged import packaged
 from sniff.bus.offline import outputs
 from sniff.bus.rows import Store
 from sniff.engine.engine import Output
