@@ -7,7 +7,6 @@ from contextlib import closing
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from dissectors.profiles import Devices
-from sniff.analysis.point_reader import PointReader
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import SessionEngine, dissector_for
@@ -16,6 +15,7 @@ from sniff.engine.session import Item, LineEvent, Session
 from sniff.engine.verdict_join import JudgedRow, VerdictJoin, Wanted
 
 if TYPE_CHECKING:
+    from sniff.analysis.point_reader import PointReader
     from sniff.bus.second_proof import SecondProof
     from sniff.engine.blocks import Block
     from sniff.engine.column_join import SettledRows
@@ -85,7 +85,7 @@ def settled(
     """
     from sniff.bus.second_proof import proving
 
-    points = PointReader(dissector_for(session), devices) if devices is not None else None
+    points = None if devices is None else _points(session, devices)
     settling = VerdictJoin(points, wanted)
     try:
         for output in proving(outputs(items, session), proof):
@@ -112,7 +112,13 @@ def settled_in_bulk(
 
     if devices is None:
         return _joined(capture, session, TableJoin(wanted), proof)
-    return _joined(capture, session, _Spoken(PointReader(dissector_for(session), devices), wanted), proof)
+    return _joined(capture, session, _Spoken(_points(session, devices), wanted), proof)
+
+
+def _points(session: Session, devices: Devices) -> PointReader:
+    from sniff.analysis.point_reader import PointReader  # with all that says values: for who has devices
+
+    return PointReader(dissector_for(session), devices)
 
 
 class _Joining(Protocol[Given]):

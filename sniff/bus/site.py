@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from dissectors.findings import Finding
-from sniff.analysis.site_ear import SiteEar
-from sniff.analysis.site_findings import SiteBus
-from sniff.bus.model import BusModel
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from dissectors.findings import Finding
+    from sniff.analysis.site_ear import SiteEar
+    from sniff.analysis.site_findings import SiteBus
+    from sniff.bus.model import BusModel
 
 
 def site_bus(model: BusModel, ear: SiteEar, findings: tuple[Finding, ...] | None = None) -> SiteBus:
     """What is known of a bus so far; its findings are those of its model, unless others are given."""
+    from sniff.analysis.site_findings import SiteBus  # most captures are of one bus
+
     session, summary = model.session, model.summary
     return SiteBus(
         session.bus,

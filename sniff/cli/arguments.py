@@ -15,7 +15,7 @@ from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.told_protocol import detected
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.engine.capture import Capture, CaptureError
-from sniff.engine.session import ASSUMED, AUTO, LINE_NOTE, OPTIONS, PROTOCOL_NOTE, Session
+from sniff.engine.session import ASSUMED, AUTO, DEVICES_NOTE, LINE_NOTE, OPTIONS, PROTOCOL_NOTE, Session
 from sniff.formats import read
 from sniff.formats.several_buses import SeveralBuses, buses_in
 
@@ -89,9 +89,11 @@ def device(token: str) -> tuple[str, str]:
 
 def devices_of(args: argparse.Namespace, configured: Mapping[str, str] | None = None) -> Devices:
     """What -d says, and behind it what is `configured`; ends with exit code 2 for a profile that cannot be used."""
+    said = dict(getattr(args, "devices", ()))
+    if not said and not configured:  # nearly always: nothing of profiles is needed
+        return Devices()
     from sniff.devices import EVERY, UnknownProfile, devices
 
-    said = dict(getattr(args, "devices", ()))
     behind = {} if EVERY in said else configured or {}
     try:
         return devices({**behind, **said})
@@ -101,6 +103,8 @@ def devices_of(args: argparse.Namespace, configured: Mapping[str, str] | None = 
 
 def noted_devices(args: argparse.Namespace, session: Session) -> Devices:
     """What -d says, and behind it what the capture says, as far as it holds such profiles or they are known here."""
+    if not getattr(args, "devices", ()) and DEVICES_NOTE not in session.notes:
+        return Devices()
     from sniff.devices import EVERY, noted, noted_devices
 
     _, unknown = noted(session)

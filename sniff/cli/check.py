@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Severity
 from sniff.analysis.sanitizing import sanitized
-from sniff.analysis.site_ear import SiteEar
-from sniff.bus.live import LiveItem
 from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
 from sniff.bus.site import site_bus, site_name
@@ -41,7 +39,8 @@ from sniff.engine.session import LineEvent
 from sniff.formats.table import suffixes
 
 if TYPE_CHECKING:
-    from sniff.bus.live import LiveBus
+    from sniff.analysis.site_ear import SiteEar
+    from sniff.bus.live import LiveBus, LiveItem
     from sniff.engine.table import Table
 
 DEFAULT_DURATION = 30.0
@@ -84,11 +83,14 @@ def run(args: argparse.Namespace) -> int:
     selected = [_select(one, args) for one in (found if args.filter else _with_sites(found))]
     checked = [one for one in selected if one.findings or not one.buses]
     colour = arguments.colour()
-    {
-        "text": lambda: check_output.write_text(checked, colour),
-        "json": lambda: check_output.write_json(checked),
-        "junit": lambda: check_output.write_junit(checked, Severity.WARNING if fail_on is None else fail_on),
-    }[args.format]()
+    if args.format == "junit":
+        from sniff.cli.check_junit import write_junit
+
+        write_junit(checked, Severity.WARNING if fail_on is None else fail_on)
+    elif args.format == "json":
+        check_output.write_json(checked)
+    else:
+        check_output.write_text(checked, colour)
     failing = fail_on is not None and any(check_output.failures(one.findings, fail_on) for one in checked)
     return int(failing)
 
@@ -127,8 +129,8 @@ def _read(source: str, capture: Capture, args: argparse.Namespace, several: bool
     run_of = Checking(
         BusModel(session, dissector_for(session), arguments.noted_devices(args, session), with_points=False)
     )
-    ear = SiteEar()
-    ears = [ear] if several else []
+    ear = _ear() if several else None
+    ears = [] if ear is None else [ear]
     survey(Watched(capture), session, run_of.model, run_of, *ears, reference=args.reference)
     complete = capture.completeness()
     notes = [] if complete.whole else [complete.text]
@@ -138,7 +140,14 @@ def _read(source: str, capture: Capture, args: argparse.Namespace, several: bool
     result = run_of.result(source, "; ".join(notes))
     shown = filtering.shown_findings(args, capture, session, result.findings, run_of.model.devices)
     result = result.with_findings(shown)
-    return replace(result, site_bus=site_bus(run_of.model, ear)) if several else result
+    return result if ear is None else replace(result, site_bus=site_bus(run_of.model, ear))
+
+
+def _ear() -> SiteEar:
+    """What is held against the other buses."""
+    from sniff.analysis.site_ear import SiteEar  # most captures are of one bus
+
+    return SiteEar()
 
 
 def _listen(port: str, args: argparse.Namespace) -> Checked:

@@ -1,15 +1,14 @@
-"""The output of `check`: text for people, JSON Lines for programs, JUnit XML for build servers."""
+"""The output of `check`: text for people, JSON Lines for programs; `check_junit.py` has JUnit XML for build servers."""
 
 from __future__ import annotations
 
 import shutil
-import sys
 import textwrap
 from array import array
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from xml.sax.saxutils import escape, quoteattr
+from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Rule, Severity, merged, times, under_causes
 from dissectors.line import NS_PER_S
@@ -17,12 +16,14 @@ from sniff.analysis.health import Health
 from sniff.analysis.json_text import dumps
 from sniff.analysis.judging import rules_over
 from sniff.analysis.sanitizing import sanitized
-from sniff.analysis.site_findings import SiteBus, judged
-from sniff.analysis.site_rules import SITE, SITE_RULES
+from sniff.analysis.site_rules import SITE_RULES
 from sniff.analysis.wording import station_word
 from sniff.bus.row_words import iso
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
+
+if TYPE_CHECKING:
+    from sniff.analysis.site_findings import SiteBus
 
 EVIDENCE_SHOWN = 5
 _INDENT = " " * 9
@@ -63,6 +64,8 @@ def as_site(name: str, buses: Sequence[Checked]) -> list[Checked]:
     held = [one.site_bus for one in buses if one.site_bus is not None]
     if len(held) < 2 or len(held) < len(buses):
         return list(buses)
+    from sniff.analysis.site_findings import judged  # of several buses
+
     site = judged([replace(bus, findings=one.findings) for bus, one in zip(held, buses, strict=True)])
     told = [one.with_findings(own) for one, own in zip(buses, site.buses, strict=True)]
     if not site.findings:
@@ -75,7 +78,7 @@ def as_site(name: str, buses: Sequence[Checked]) -> list[Checked]:
     ]
 
 
-def _rules(one: Checked) -> Mapping[str, Rule]:
+def rules_of(one: Checked) -> Mapping[str, Rule]:
     """The catalogue by which it was judged."""
     return SITE_RULES if one.buses else rules_over(dissector_for(one.session))
 
@@ -156,21 +159,21 @@ def _write_finding(one: Checked, finding: Finding, width: int, colour: bool) -> 
     if colour:
         label = f"\x1b[{_COLOURS[finding.severity]}m{label}\x1b[0m"
     print(f"{label} {finding.subject}: {title}  [{finding.code}]")
-    _paragraph(_sentence(finding.seen), width, _INDENT)
+    _paragraph(sentence(finding.seen), width, _INDENT)
     for word, text in (("means", finding.means), ("next", finding.next)):
         if text and finding.severity > Severity.INFO:
             _paragraph(f"{word + ':':<7}{text}", width, _INDENT, _INDENT + " " * 7)
     if finding.evidence:
-        _paragraph(_evidence(one, finding), width, _INDENT, _INDENT + " " * 7)
+        _paragraph(evidence(one, finding), width, _INDENT, _INDENT + " " * 7)
 
 
 def _write_consequence(one: Checked, finding: Finding, width: int) -> None:
     """What a finding above most likely explains: one paragraph under it; what to do stands there."""
-    words = f"└ {finding.subject}: {_title(one, finding)}  [{finding.code}]  {_sentence(finding.seen)}"
+    words = f"└ {finding.subject}: {_title(one, finding)}  [{finding.code}]  {sentence(finding.seen)}"
     _paragraph(words, width, _INDENT, _INDENT + "  ")
 
 
-def _evidence(one: Checked, finding: Finding) -> str:
+def evidence(one: Checked, finding: Finding) -> str:
     shown = []
     for no in finding.evidence[:EVIDENCE_SHOWN]:
         start = one.start(no)
@@ -189,11 +192,11 @@ def _paragraph(text: str, width: int, first: str, rest: str | None = None) -> No
 
 
 def _title(one: Checked, finding: Finding) -> str:
-    rule = _rules(one).get(finding.code) or SITE_RULES.get(finding.code)
+    rule = rules_of(one).get(finding.code) or SITE_RULES.get(finding.code)
     return rule.title if rule is not None else ""
 
 
-def _sentence(text: str) -> str:
+def sentence(text: str) -> str:
     return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
 
 
@@ -252,65 +255,3 @@ def to_json(one: Checked, finding: Finding) -> dict[str, object]:
         "next": finding.next,
         "cause": None if finding.cause is None else {"code": finding.cause[0], "subject": finding.cause[1]},
     }
-
-
-# ---- JUnit
-
-
-def write_junit(checked: Sequence[Checked], fail_on: Severity) -> None:
-    """Print one test suite a source, one test case a rule: it fails when a finding of it is at or above `fail_on`, but
-    for the consequences of another finding, which stand in the text of their cause too."""
-    lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<testsuites name="sniff485 check">']
-    for one in checked:
-        lines += _suite(one, fail_on)
-    lines.append("</testsuites>")
-    sys.stdout.write("\n".join(lines) + "\n")
-
-
-def _suite(one: Checked, fail_on: Severity) -> list[str]:
-    rules, kind = _rules(one), SITE if one.buses else one.session.protocol
-    failing = {finding.code for finding in failures(one.findings, fail_on)}
-    head = (
-        f"  <testsuite name={_attribute(one.source)} tests={_attribute(str(len(rules)))} "
-        f'failures={_attribute(str(len(failing)))} errors="0" time={_attribute(f"{one.seconds:.3f}")}>'
-    )
-    lines = [head]
-    for code, rule in sorted(rules.items()):
-        found = [finding for finding in one.findings if finding.code == code]
-        case = f"    <testcase classname={_attribute(kind)} name={_attribute(f'{code} {rule.title}')}"
-        if not found:
-            lines.append(case + "/>")
-            continue
-        lines.append(case + ">")
-        bad = failures(one.findings, fail_on, code)
-        if bad:
-            text = "\n".join(_junit_text(one, finding) for finding in bad)
-            lines.append(
-                f"      <failure message={_attribute(f'{bad[0].subject}: {bad[0].seen}')} "
-                f"type={_attribute(bad[0].severity.label)}>{escape(_clean(text))}</failure>"
-            )
-        else:
-            text = "\n".join(_junit_text(one, finding) for finding in found)
-            lines.append(f"      <system-out>{escape(_clean(text))}</system-out>")
-        lines.append("    </testcase>")
-    return [*lines, "  </testsuite>"]
-
-
-def _junit_text(one: Checked, finding: Finding) -> str:
-    evidence = f"\n{_evidence(one, finding)}" if finding.evidence else ""
-    head = f"{finding.severity.label}: {finding.subject}: {_sentence(finding.seen)}"
-    explained = "".join(
-        f"\nexplains {other.code} {other.subject}: {_sentence(other.seen)}"
-        for other in one.findings
-        if other.cause == finding.key
-    )
-    return f"{head}\nmeans: {finding.means}\nnext: {finding.next}{evidence}{explained}"
-
-
-def _attribute(text: str) -> str:
-    return quoteattr(_clean(text))
-
-
-def _clean(text: str) -> str:
-    """Without characters that XML 1.0 does not allow, or that a terminal obeys."""
-    return "\n".join(map(sanitized, text.split("\n")))

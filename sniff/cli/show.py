@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING
 
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
-from sniff.analysis.packet_tree import Field
-from sniff.analysis.row_tree import tree_of
 from sniff.bus import row_words as rows
 from sniff.bus.offline import settled_columns
 from sniff.bus.second_proof import SecondProof
@@ -29,6 +27,7 @@ from sniff.formats.parquet import ParquetWriter
 
 if TYPE_CHECKING:
     from dissectors.columns import Times
+    from sniff.analysis.packet_tree import Field
     from sniff.cli.field_names import FieldCells
     from sniff.engine.column_join import SettledRows
     from sniff.filter import Filter
@@ -192,11 +191,9 @@ def _listed(
     args: argparse.Namespace, dissector: Dissector, session: Session, table: ParquetWriter | None
 ) -> Callable[[SettledRows, Times], None]:
     """What lists rows at some places."""
-    from sniff.cli.row_cells import RowCells, json_lines, separated
-    from sniff.cli.row_columns import RowColumns
-    from sniff.cli.row_lines import RowLines
-
     if table is not None:
+        from sniff.cli.row_columns import RowColumns
+
         columns = RowColumns(dissector, session)
 
         def added(some: SettledRows, places: Times) -> None:
@@ -205,13 +202,18 @@ def _listed(
 
         return added
     made: RowCells | RowLines
-    if args.csv:
-        made = RowCells(dissector, session, rows.JSON_KEYS, separated(len(rows.JSON_KEYS), ","))
-    elif args.table:
-        made = RowCells(dissector, session, args.names, separated(len(args.names), "\t"))
-    elif args.json:
-        made = RowCells(dissector, session, rows.JSON_KEYS, json_lines(rows.JSON_KEYS))
+    if args.csv or args.table or args.json:
+        from sniff.cli.row_cells import RowCells, json_lines, separated
+
+        if args.csv:
+            made = RowCells(dissector, session, rows.JSON_KEYS, separated(len(rows.JSON_KEYS), ","))
+        elif args.table:
+            made = RowCells(dissector, session, args.names, separated(len(args.names), "\t"))
+        else:
+            made = RowCells(dissector, session, rows.JSON_KEYS, json_lines(rows.JSON_KEYS))
     else:
+        from sniff.cli.row_lines import RowLines
+
         made = RowLines(dissector, session, arguments.colour())
     return lambda some, places: standard_streams.write(made.lines(some, places))
 
@@ -229,6 +231,8 @@ def _cells(
 
 
 def _tree(item: JudgedRow, dissector: Dissector) -> str:
+    from sniff.analysis.row_tree import tree_of  # with what takes packets apart
+
     return "\n".join(_tree_lines(tree_of(dissector, item.row, item.transaction, rows.iso, item.meaning), "        "))
 
 

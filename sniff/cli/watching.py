@@ -34,9 +34,11 @@ def add_duration(parser: argparse.ArgumentParser) -> None:
 
 def port_of(sources: Sequence[str]) -> str | None:
     """The port or configured bus that is meant; None where files are. Ends with exit code 2 for both at once."""
+    ports = [source for source in sources if not is_file(source)]
+    if not ports:
+        return None
     from sniff.cli import USAGE, Failure, targets
 
-    ports = [source for source in sources if not is_file(source)]
     named = [one for one in ports if is_port(one) or one in targets.configured().buses]
     if not named:
         return None
@@ -48,7 +50,7 @@ def port_of(sources: Sequence[str]) -> str | None:
 def is_file(source: str) -> bool:
     """Whether it is what captures are read from."""
     path = Path(source)
-    return source == "-" or source.lower().endswith(suffixes()) or path.is_file() or path.is_fifo()
+    return source == "-" or path.is_file() or path.is_fifo() or source.lower().endswith(suffixes())
 
 
 def is_port(source: str) -> bool:

@@ -14,11 +14,9 @@ from typing import TYPE_CHECKING
 from dissectors.frame import Chunk
 from dissectors.profiles import Devices
 from sniff.analysis.sanitizing import sanitized
-from sniff.bus.capture_writer import create
 from sniff.bus.offline import ReadSource
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.cli.progress import Watched
-from sniff.devices import noted_devices
 from sniff.engine.capture import BlockWriter, Capture, CaptureError, CaptureWriter
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for, engine_for
@@ -61,6 +59,9 @@ def write(
     refuse_to_overwrite(target, sources, args.force)
     counts = _Counts()
     watched = Watched(with_comments(source))
+    from sniff.bus.capture_writer import create  # with the formats that are written
+    from sniff.devices import noted_devices
+
     try:
         with create(target, session, options, notes, marks) as writer:
             takers: list[_Frames | _Values | _Topics] = [_Frames(writer, session)] if with_frames else []
