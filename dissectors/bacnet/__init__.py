@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dissectors.bacnet import ip, ring_table
+from dissectors.bacnet import ring_table
 from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.fields import fields
@@ -10,7 +10,6 @@ from dissectors.bacnet.findings import MstpFindings, judge
 from dissectors.bacnet.frame_types import PREAMBLE
 from dissectors.bacnet.framing import MstpFramer
 from dissectors.bacnet.header import peek
-from dissectors.bacnet.ip_framing import IP_NAME, IpFramer
 from dissectors.bacnet.readings import asks, readings
 from dissectors.bacnet.reassembly import Reassembler
 from dissectors.bacnet.renamer import MstpRenamer
@@ -113,26 +112,4 @@ MSTP = Dissector(
     stencil=stencil,
     field_types=field_types,
     scenarios=on_first_use("dissectors.bacnet.scenario:scenarios"),
-)
-
-BACNET_IP = Dissector(
-    name=IP_NAME,
-    title="BACnet/IP",
-    framer=IpFramer,
-    peek=ip.peek_ip,
-    tracker=ip.IpTracker,
-    text=ip.ip_text,
-    meant=ip.ip_meant,
-    asks=ip.ip_asks,
-    fields=ip.ip_fields,
-    packet=ip.ip_packet,
-    default_line="115200,8N1",
-    field_prefixes=("bvlc.", "ip.", "bacnet.", "bacapp."),
-    noun="host",
-    family="bacnet",
-    bits=ip.ip_bits,
-    readings=ip.ip_readings,
-    packet_file=PacketFile((147,), datagrams=b"\x81", ports=((47808, "BACnet/IP"),)),
-    makers={IP_NAME: ip.make_ip},
-    field_types=ip.ip_types,
 )

@@ -8,7 +8,6 @@ from dissectors.checksums import ends_with_crc16
 from dissectors.frame import Frame
 from dissectors.line import Timing
 from dissectors.manifest import Dissector, PacketFile, on_first_use
-from dissectors.modbus import tcp
 from dissectors.modbus.ascii_framing import AsciiFramer
 from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, make_ascii, make_rtu
 from dissectors.modbus.fields import answer_fields, fields
@@ -19,8 +18,6 @@ from dissectors.modbus.places import place, spans
 from dissectors.modbus.readings import asks, readings, refusal
 from dissectors.modbus.renamer import AsciiRenamer, RtuRenamer
 from dissectors.modbus.rules import RULES
-from dissectors.modbus.tcp_framing import TCP_NAME, TcpFramer
-from dissectors.modbus.tcp_tracker import TcpTracker
 from dissectors.modbus.text import meant, text
 from dissectors.modbus.tracker import ModbusTracker
 from dissectors.questions import Questions
@@ -28,7 +25,6 @@ from dissectors.questions import Questions
 __all__ = [
     "ASCII",
     "RTU",
-    "TCP",
     "AsciiFramer",
     "ModbusTracker",
     "RtuFramer",
@@ -157,31 +153,4 @@ ASCII = Dissector(
     kernel=ascii_kernel,
     pairing=ascii_pairing,
     field_types=ascii_field_types,
-)
-
-TCP = Dissector(
-    name=TCP_NAME,
-    title="Modbus TCP",
-    framer=TcpFramer,
-    peek=tcp.peek_tcp,
-    tracker=TcpTracker,
-    text=tcp.tcp_text,
-    meant=tcp.tcp_meant,
-    asks=tcp.tcp_asks,
-    answer_fields=tcp.tcp_answer_fields,
-    place=place,
-    spans=tcp.tcp_spans,
-    fields=tcp.tcp_fields,
-    packet=tcp.tcp_packet,
-    default_line="115200,8N1",
-    field_prefixes=("mbtcp.", "modbus."),
-    bits=tcp.tcp_bits,
-    renamer=tcp.TcpRenamer,
-    makers={TCP_NAME: tcp.make_tcp},
-    family="modbus",
-    readings=tcp.tcp_readings,
-    refusal=tcp.tcp_refusal,
-    questions=Questions(tcp.tcp_question),
-    register_maps=register_maps,
-    field_types=tcp.tcp_types,
 )

@@ -12,12 +12,14 @@ from typing import Any
 from dissectors.field_types import FieldType, FieldTypes, Kind
 from dissectors.frame import Check, Damage, Frame, Header, Role
 from dissectors.meaning import Meaning, Span
-from dissectors.modbus import fields as serial_fields
-from dissectors.modbus import places, text
-from dissectors.modbus import readings as serial_readings
 from dissectors.modbus.envelope import RTU_NAME, seal_rtu
+from dissectors.modbus.fields import answer_fields, fields
 from dissectors.modbus.header import peek_rtu
+from dissectors.modbus.places import spans
+from dissectors.modbus.readings import asks, refusal
+from dissectors.modbus.readings import readings as serial_readings
 from dissectors.modbus.tcp_framing import HEADER, TCP_NAME
+from dissectors.modbus.text import meant, text
 from dissectors.questions import Question
 from dissectors.readings import Reading
 
@@ -46,12 +48,12 @@ def peek_tcp(frame: Frame) -> Header:
 
 def tcp_text(frame: Frame, header: Header, role: Role) -> str:
     """One line about a frame, its transaction number at the end. Total."""
-    return f"{text.text(twin(frame), header, role)}  #{transaction(frame)}"
+    return f"{text(twin(frame), header, role)}  #{transaction(frame)}"
 
 
 def tcp_meant(frame: Frame, header: Header, role: Role, meaning: Meaning) -> str:
     """The same, what it means to its device first. Total."""
-    return f"{text.meant(twin(frame), header, role, meaning)}  #{transaction(frame)}"
+    return f"{meant(twin(frame), header, role, meaning)}  #{transaction(frame)}"
 
 
 def tcp_fields(frame: Frame, role: Role) -> Fields:
@@ -61,30 +63,28 @@ def tcp_fields(frame: Frame, role: Role) -> Fields:
     for name, begin, end in (("trans_id", 0, 2), ("prot_id", 2, 4), ("len", 4, 6), ("unit_id", 6, 7)):
         if len(octets) >= end:
             found[f"mbtcp.{name}"] = int.from_bytes(octets[begin:end], "big")
-    told = serial_fields.fields(twin(frame), role)
+    told = fields(twin(frame), role)
     return found | {name: value for name, value in told.items() if not name.startswith("mbrtu.")}
 
 
 def tcp_answer_fields(request: Frame, answer: Frame) -> Fields:
     """The numbers of what an answer holds, which only its request tells."""
-    return serial_fields.answer_fields(twin(request), twin(answer))
+    return answer_fields(twin(request), twin(answer))
 
 
 def tcp_readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ...]:
     """See `dissectors.readings.Readings`."""
-    return serial_readings.readings(
-        None if request is None else twin(request), None if response is None else twin(response)
-    )
+    return serial_readings(None if request is None else twin(request), None if response is None else twin(response))
 
 
 def tcp_asks(frame: Frame) -> tuple[Reading, ...]:
     """See `dissectors.readings.Asks`."""
-    return serial_readings.asks(twin(frame))
+    return asks(twin(frame))
 
 
 def tcp_refusal(frame: Frame) -> tuple[str, int] | None:
     """See `dissectors.readings.Refusal`."""
-    return serial_readings.refusal(twin(frame))
+    return refusal(twin(frame))
 
 
 def tcp_question(frame: Frame) -> Question:
@@ -96,7 +96,7 @@ def tcp_question(frame: Frame) -> Question:
 
 def tcp_spans(frame: Frame, readings: Sequence[Reading]) -> list[Span | None]:
     """The octets of each reading."""
-    found = places.spans(twin(frame), readings)
+    found = spans(twin(frame), readings)
     return [None if span is None else (span[0] + HEADER, span[1] + HEADER) for span in found]
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dissectors.bacnet import BACNET_IP
 from dissectors.bacnet.ip import make_ip
 from dissectors.bacnet.ip_framing import IpFramer
+from dissectors.bacnet.ip_manifest import BACNET_IP
 from dissectors.frame import Check, Chunk, Damage, FoundBy, Frame, Header, Role
 from dissectors.line import LineSettings, Timing
 from dissectors.tracker import Verdict

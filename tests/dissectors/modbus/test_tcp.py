@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from dissectors.frame import Check, Chunk, Damage, Frame, Header, Noise, Role
 from dissectors.line import NS_PER_S, LineSettings, Timing
-from dissectors.modbus import TCP
 from dissectors.modbus.tcp import make_tcp
 from dissectors.modbus.tcp_framing import TcpFramer
+from dissectors.modbus.tcp_manifest import TCP
 from dissectors.tracker import Verdict
 from sniff.testing.framer_contract import framer_contract
 
