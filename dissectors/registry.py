@@ -13,11 +13,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from dissectors.installed import entry_points
-from dissectors.manifest import Dissector
-from dissectors.plugin_guard import guarded
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
+
+    from dissectors.manifest import Dissector
 
 GROUP = "sniff485.dissectors"
 
@@ -30,8 +30,8 @@ BUILT_IN: Mapping[str, str] = {
 }
 
 RELATIVES: Mapping[str, str] = {
-    "modbus-tcp": "dissectors.modbus:TCP",
-    "bacnet-ip": "dissectors.bacnet:BACNET_IP",
+    "modbus-tcp": "dissectors.modbus.tcp_manifest:TCP",
+    "bacnet-ip": "dissectors.bacnet.ip_manifest:BACNET_IP",
 }
 """Relatives on networks of the protocols of lines: known by name, looked for in captures of networks, on no line."""
 
@@ -58,6 +58,16 @@ def known() -> tuple[str, ...]:
     return (*names(), *RELATIVES)
 
 
+def is_of_lines(name: str) -> bool:
+    """Whether `names` has it. For a built-in one nobody looks what other packages bring."""
+    return name in BUILT_IN or (name != "" and name in names())
+
+
+def is_known(name: str) -> bool:
+    """Whether `known` has it."""
+    return name in RELATIVES or is_of_lines(name)
+
+
 def relatives() -> tuple[Dissector, ...]:
     """The relatives on networks."""
     return tuple(get(name) for name in RELATIVES)
@@ -79,6 +89,8 @@ def get(name: str) -> Dissector:
 
 @cache
 def _built_in(target: str) -> Dissector:
+    from dissectors.manifest import Dissector  # by now the protocol's own import; none for whoever wants the names
+
     module, _, name = target.partition(":")
     found = getattr(import_module(module), name)
     assert isinstance(found, Dissector)
@@ -115,6 +127,9 @@ def _plugged(point: EntryPoint) -> Dissector:
     """The protocol of another package. Raises BrokenPlugin."""
     package = f" of package {point.dist.name}" if point.dist is not None else ""
     where = f"plug-in {point.name!r}{package}"
+    from dissectors.manifest import Dissector
+    from dissectors.plugin_guard import guarded
+
     try:
         found = point.load()
     except Exception as error:  # its module is imported: anything may happen

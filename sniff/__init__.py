@@ -6,12 +6,13 @@ For notebooks: `sniff.read("night.mcap")` gives a capture as data frames; see da
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sniff.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from sniff.data_frames import DataCapture
 
 

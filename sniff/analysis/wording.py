@@ -52,7 +52,7 @@ def _octets(event: Event) -> str:
 
 def station_word(protocol: str) -> str:
     """What the people of that protocol call a place on the bus; "station" where it is not known here."""
-    return registry.get(protocol).noun if protocol in registry.known() else "station"
+    return registry.get(protocol).noun if registry.is_known(protocol) else "station"
 
 
 def mark_names(error: LineError) -> str:

@@ -48,7 +48,7 @@ class SecondProof:
         self.name = session.notes.get(SECOND_NOTE, "")
         self.since = 0
         self._session = session
-        known = not session.unknown and session.protocol in registry.names()  # a relative on networks has streams
+        known = not session.unknown and registry.is_of_lines(session.protocol)  # a relative on networks has streams
         self._asks = known and not self.name
         self._octets = self._window = self._asked = 0
         self._sample: deque[tuple[int, Chunk]] = deque()  # with the number of the row

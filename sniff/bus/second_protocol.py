@@ -150,10 +150,10 @@ class ForeignFrames:
         if self._stretch is not None:
             self._count(self._stretch.end())
         name = self._proof.name
-        return None if name not in registry.names() else (registry.get(name), self._counted)
+        return (registry.get(name), self._counted) if registry.is_of_lines(name) else None
 
     def _take(self, items: Iterable[Output | Table]) -> None:
-        if self._proof.name not in registry.names():
+        if not registry.is_of_lines(self._proof.name):
             return
         stretch = self._stretch = self._stretch or Stretch(self._session, self._proof.name)
         for row in (row for item in items for row in _left_rows(item)):
@@ -253,7 +253,7 @@ class _Placing:
 
     def add(self, table: Table, proof: SecondProof) -> Iterator[tuple[Table, Mapping[int, list[Row]]]]:
         """Take the table that follows; give those that are known."""
-        if proof.name not in registry.names():
+        if not registry.is_of_lines(proof.name):
             yield table, {}
             return
         stretch = self._stretch = self._stretch or Stretch(self._session, proof.name)

@@ -10,7 +10,6 @@ import argparse
 import contextlib
 import os
 import sys
-import traceback
 from collections.abc import Iterable
 from importlib import import_module
 from types import ModuleType
@@ -18,9 +17,7 @@ from typing import cast
 
 from dissectors import registry
 from sniff.cli import standard_streams
-from sniff.engine.capture import CaptureError
-from sniff.formats import cut_capture
-from sniff.formats.several_buses import chosen as bus_chosen
+from sniff.engine.capture_error import CaptureError
 from sniff.version import __version__
 
 COMMANDS: dict[str, str] = {
@@ -93,12 +90,7 @@ def main(argv: list[str] | None = None) -> int:
     standard_streams.prepare()
     os.environ.setdefault(*_NO_MATRICES)
     try:
-        cut_capture.forget()
-        code = _run(arguments)
-        sys.stdout.flush()
-        for path, damage in cut_capture.unsaid():
-            standard_streams.say(_plain(f"{path}: {damage}; all before it was read"))
-        return UNREADABLE if code in (0, FOUND) and cut_capture.was_cut() else code
+        return _run(arguments)
     except SystemExit:  # argparse, after --help, --version or a line of its own
         broken = standard_streams.output_error()
         if broken is None:
@@ -132,6 +124,8 @@ def _failed(error: Exception, traced: bool) -> int:
         standard_streams.say("not enough memory for that")
         return UNREADABLE
     if traced:
+        import traceback
+
         with contextlib.suppress(OSError, ValueError):
             traceback.print_exception(error)
     what = f"{type(error).__name__}: {error}"
@@ -143,6 +137,8 @@ def _failed(error: Exception, traced: bool) -> int:
 
 def _place(error: Exception) -> str:
     """Where it happened: file and line of the innermost frame of our own."""
+    import traceback
+
     elsewhere = getattr(error, "places_elsewhere", ())  # in the process that read a capture (bus/two_processes.py)
     frames = [
         *traceback.extract_tb(error.__traceback__),
@@ -159,21 +155,37 @@ def _run(arguments: list[str]) -> int:
     if name is not None and name not in COMMANDS:
         raise Failure(_no_such_command(name), USAGE)
     epilog = f"{_protocols()}\n\n{EPILOG}" if asked else EPILOG
-    parser, imported = command_line([name] if name is not None else [], epilog)
+    chosen_alone = name is not None and arguments[0] == name  # no word before it asks for the help of all
+    wanted = [name] if name is not None else []
+    parser, imported = command_line(wanted, epilog, wanted if chosen_alone else COMMANDS)
     chosen = imported.get(name or "")
     if getattr(chosen, "TOLERANT", False):
         args, _ = parser.parse_known_args(arguments)
     else:
         args = parser.parse_args(arguments)
     assert chosen is not None  # argparse has refused anything else
+    return _carried_out(chosen, args)
+
+
+def _carried_out(command: ModuleType, args: argparse.Namespace) -> int:
+    """The exit code of a command that was understood; a file that was cut counts."""
+    from sniff.formats import cut_capture  # with all that a capture is: nothing for whoever asks for help or version
+    from sniff.formats.several_buses import chosen as bus_chosen
+
+    cut_capture.forget()
     with bus_chosen(getattr(args, "bus", None)):
-        return int(chosen.run(args))
+        code = int(command.run(args))
+    sys.stdout.flush()
+    for path, damage in cut_capture.unsaid():
+        standard_streams.say(_plain(f"{path}: {damage}; all before it was read"))
+    return UNREADABLE if code in (0, FOUND) and cut_capture.was_cut() else code
 
 
 def command_line(
-    configured: Iterable[str] = COMMANDS, epilog: str = EPILOG
+    configured: Iterable[str] = COMMANDS, epilog: str = EPILOG, named: Iterable[str] = COMMANDS
 ) -> tuple[argparse.ArgumentParser, dict[str, ModuleType]]:
-    """The parser of all commands, and the modules of those whose options it knows; the others are only names.
+    """The parser of all commands, and the modules of those whose options it knows; the others are only names, and those
+    that are not even `named` it refuses.
 
     What is generated from the command line (manual pages, completion, pages of the documentation) is made from it.
     """
@@ -186,7 +198,8 @@ def command_line(
     parser.add_argument("--version", action="version", version=f"sniff485 {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     wanted, imported = set(configured), {}
-    for command, text in COMMANDS.items():
+    for command in named:
+        text = COMMANDS[command]
         sub = commands.add_parser(
             command,
             help=text,

@@ -124,7 +124,7 @@ def line_settings(token: str) -> LineSettings:
 
 def protocol(name: str) -> str:
     """argparse type for -p."""
-    if name not in registry.known():
+    if not registry.is_known(name):
         raise argparse.ArgumentTypeError(f"unknown protocol {name!r}; expected one of {', '.join(registry.known())}")
     return name
 

@@ -95,7 +95,7 @@ def of_second(args: argparse.Namespace, session: Session, name: str) -> Filter |
     """What -Y says of frames of a second protocol on the bus; None where it asks for what they cannot have."""
     from sniff.filter import FilterError, Scope, compile_filter
 
-    if name not in registry.names():
+    if not registry.is_of_lines(name):
         return None
     try:
         return compile_filter(args.filter, registry.get(name), Scope(session.started, Devices()))

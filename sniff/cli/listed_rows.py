@@ -53,7 +53,7 @@ class ListedRows:
     def of_both(self, devices: Devices | None) -> Iterator[Judged]:
         """Those from where a second protocol is proven."""
         name = self._proof.name
-        if name in registry.names():
+        if registry.is_of_lines(name):
             filters = self._args.filter
             of_second = filtering.of_second(self._args, self._session, name) if filters else _every_row
             asked = None if of_second is None else self._noting(of_second)

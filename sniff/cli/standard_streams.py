@@ -6,7 +6,6 @@ import codecs
 import contextlib
 import errno
 import io
-import json
 import os
 import select
 import sys
@@ -163,4 +162,6 @@ def _escape(error: UnicodeError) -> tuple[str, int]:
     files as cp1252)."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
+    import json  # a terminal has nearly all characters
+
     return json.dumps(error.object[error.start : error.end])[1:-1], error.end

@@ -67,7 +67,7 @@ def _renamer(session: Session) -> Renamer:
 
 def knows(protocol: str) -> bool:
     """Whether this protocol's addresses and texts are known here."""
-    return protocol in registry.known() and registry.get(protocol).renamer is not None
+    return registry.is_known(protocol) and registry.get(protocol).renamer is not None
 
 
 def anonymised(items: Iterable[Item], session: Session) -> Iterator[Item]:

@@ -93,7 +93,7 @@ class SessionEngine:
 
     def _change(self, change: SettingsChange, now: int) -> Output:
         line = change.line or self._in_force
-        if change.protocol not in (None, *registry.known()):  # a file may say anything
+        if change.protocol is not None and not registry.is_known(change.protocol):  # a file may say anything
             change = replace(change, protocol=None)
         if change.found and self.searching:
             return self._find(change)
