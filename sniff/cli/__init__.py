@@ -139,7 +139,7 @@ def _place(error: Exception) -> str:
     """Where it happened: file and line of the innermost frame of our own."""
     import traceback
 
-    elsewhere = getattr(error, "places_elsewhere", ())  # in the process that read a capture (bus/two_processes.py)
+    elsewhere = getattr(error, "places_elsewhere", ())  # in the process that read a capture (bus/reading_process.py)
     frames = [
         *traceback.extract_tb(error.__traceback__),
         *(traceback.FrameSummary(file, line, "") for file, line in elsewhere),
