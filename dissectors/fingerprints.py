@@ -18,7 +18,11 @@ LONGEST = 1 << 12
 
 @cache
 def _weights() -> npt.NDArray[np.uint64]:
-    return np.random.default_rng(485).integers(1 << 64, size=LONGEST + 1, dtype=np.uint64)
+    """Numbers without a pattern, by splitmix64; numpy's own generators with hashlib and secrets take long to import."""
+    mixed: npt.NDArray[np.uint64] = np.arange(1, LONGEST + 2, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+        mixed = (mixed ^ (mixed >> np.uint64(shift))) * np.uint64(factor)
+    return mixed ^ (mixed >> np.uint64(31))
 
 
 def gathered(octets: Octets, begins: Times, lengths: Times) -> tuple[Octets, Times]:
