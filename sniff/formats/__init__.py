@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dissectors.frame import Chunk
 from sniff.engine.capture import Capture, CaptureError, CaptureWriter
@@ -20,8 +20,10 @@ from sniff.formats import compressed, table
 from sniff.formats.cut_capture import cut_short
 from sniff.formats.files import explain, open_capture
 from sniff.formats.mark_file import with_marks
-from sniff.formats.records import FrameFile
 from sniff.formats.several_buses import SeveralBuses, buses_in
+
+if TYPE_CHECKING:
+    from sniff.formats.records import FrameFile
 
 SAMPLE = 6000
 """Octets at the begin of a capture that are kept with its session, to tell its protocol."""
@@ -52,7 +54,9 @@ def _opened(path: Path) -> Capture:
         around.append(wrapping.name)
         if len(around) > compressed.DEEPEST:
             raise CaptureError(f"{path}: {' in '.join(reversed(around))}; unpack it first")
-        unpacked = compressed.unpack(place, wrapping)
+        from sniff.formats.unpacking import unpack  # with what unpacks: most captures are as they were written
+
+        unpacked = unpack(place, wrapping)
         place, damage = unpacked.path, damage or unpacked.damage
     try:
         found = _reader(place, start)(place)

@@ -16,7 +16,7 @@ import zstandard
 from dissectors.frame import Chunk
 from sniff.bus.capture_writer import create
 from sniff.engine.capture import Capture, CaptureError
-from sniff.formats import compressed, read, table
+from sniff.formats import compressed, read, table, unpacking
 from sniff.formats.raw_dump import RawDump
 from sniff.formats.text import TextCapture, parse
 
@@ -75,7 +75,7 @@ def test_packed_files_cut_anywhere(packed: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("packed", PACKERS)
 def test_a_bomb_is_refused(packed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compressed, "LITTLE", 1 << 20)
+    monkeypatch.setattr(unpacking, "LITTLE", 1 << 20)
     path = tmp_path / f"x.log{packed}"
     path.write_bytes(PACKERS[packed](bytes(20 << 20)))
     with pytest.raises(CaptureError, match="unpack it yourself"):
