@@ -17,7 +17,6 @@ from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.bulk_line_findings import BulkLineFindings
 from sniff.analysis.judgement import Judgement
 from sniff.analysis.line_rules import LINE_RULES
-from sniff.analysis.profile_findings import ProfileFindings
 from sniff.analysis.profile_rules import PROFILE_RULES
 from sniff.analysis.site_rules import SITE_RULES
 from sniff.engine.engine import Output
@@ -25,6 +24,7 @@ from sniff.engine.session import LineEvent, LineEventKind, Session, settings_cha
 
 if TYPE_CHECKING:
     from dissectors.columns import Masks, TransactionColumns
+    from sniff.analysis.profile_findings import ProfileFindings
     from sniff.engine.table import Table
 
 _DOUBTFUL = frozenset(
@@ -76,7 +76,7 @@ class Judging:
         self.judge = dissector.judge(session.timing) if dissector.judge is not None else None
         self.of_line: LineJudging | None = LineJudging(session, dissector)
         self._rules = rules_over(dissector)
-        self.devices = ProfileFindings(session.timing, dissector, devices) if devices else None
+        self.devices = _of_devices(session, dissector, devices) if devices else None
         if devices and isinstance(self.judge, WordsExceptions):
             family = dissector.profile_family
             self.judge.word_exceptions(lambda station, code: devices.exception(station, family, code))
@@ -210,6 +210,12 @@ class Judging:
         made = (*(self.judge.findings() if self.judge is not None else ()),)
         made += self.devices.findings() if self.devices is not None else ()
         return replace(judged, bus=made)
+
+
+def _of_devices(session: Session, dissector: Dissector, devices: Devices) -> ProfileFindings:
+    from sniff.analysis.profile_findings import ProfileFindings  # with what reads and says values
+
+    return ProfileFindings(session.timing, dissector, devices)
 
 
 def is_strange(table: Table) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from dissectors.findings import Finding
@@ -10,25 +11,24 @@ from dissectors.profiles import Devices
 from sniff.analysis.health import HealthReport, health_of
 from sniff.analysis.judging import Judging, LineJudging
 from sniff.analysis.load import KEPT_SECONDS
-from sniff.analysis.point_reader import PointReader, Sample
-from sniff.analysis.points import PointTable
-from sniff.analysis.polls import Polls
-from sniff.analysis.register_series import RegisterSeries
 from sniff.analysis.summary import Summary
 from sniff.bus.telling_rows import telling_rows, telling_transactions
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, Session
 
 if TYPE_CHECKING:
+    from sniff.analysis.point_reader import PointReader, Sample
+    from sniff.analysis.points import PointTable
+    from sniff.analysis.polls import Polls
+    from sniff.analysis.register_series import RegisterSeries
     from sniff.engine.table import Table
 
 
 class BusModel:
     """What is counted, found and measured on one bus.
 
-    `summary`: counts, stations, load. `judging`: the rules. `reader`, `points`: values by device. `samples`: those that
-    the newest output completed. `series`: what the registers of stations without a profile did. `polls`: the master's
-    programme. `version` changes whenever anything changed. `reads_points`: whether values and requests are read at all.
+    `summary`: counts, stations, load. `judging`: the rules. `samples`: values that the newest output completed.
+    `version` changes whenever anything changed. `reads_points`: whether values and requests are read at all.
     """
 
     def __init__(
@@ -43,8 +43,6 @@ class BusModel:
         self.reads_points = with_points
         self.devices = devices or Devices()
         self.summary = Summary(session.line, kept_seconds=kept_seconds)
-        self.points = PointTable()
-        self.series = RegisterSeries()
         self.samples: list[Sample] = []
         self.version = 0
         self._use(session, dissector)
@@ -53,9 +51,41 @@ class BusModel:
         self.session = session
         self.dissector = dissector
         self.judging = Judging(session, dissector, self.devices)
-        self.reader = PointReader(dissector, self.devices)
-        self.polls = Polls(dissector)
+        for name in ("reader", "polls"):  # those of other settings
+            vars(self).pop(name, None)
+        if self.reads_points:
+            self.read_points()
         self._found: tuple[int, tuple[Finding, ...]] = (-1, ())
+
+    # what is made, and imported, only where values and requests are read
+
+    @cached_property
+    def reader(self) -> PointReader:
+        """Values by device, as they come."""
+        from sniff.analysis.point_reader import PointReader
+
+        return PointReader(self.dissector, self.devices)
+
+    @cached_property
+    def points(self) -> PointTable:
+        """The latest of them."""
+        from sniff.analysis.points import PointTable
+
+        return PointTable()
+
+    @cached_property
+    def series(self) -> RegisterSeries:
+        """What the registers of stations without a profile did."""
+        from sniff.analysis.register_series import RegisterSeries
+
+        return RegisterSeries()
+
+    @cached_property
+    def polls(self) -> Polls:
+        """The master's programme."""
+        from sniff.analysis.polls import Polls
+
+        return Polls(self.dissector)
 
     def settle(self, session: Session, dissector: Dissector) -> None:
         """Go on with settings that were found; what was heard during their search says nothing of the bus."""
@@ -66,6 +96,7 @@ class BusModel:
     def read_points(self) -> None:
         """From now on values and requests are read, too."""
         self.reads_points = True
+        _ = self.reader, self.points, self.series, self.polls  # now: others may look at them from threads of their own
 
     def add(self, output: Output) -> None:
         """Take what the engine gave."""
