@@ -1,4 +1,4 @@
-"""The process that reads for another (`two_processes.py` says when): its begin and end, what the two say to each other."""
+"""The process that reads for another (`two_processes.py` says when): begin and end, what the two say to each other."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dissectors.frame import Frame, Role
 from dissectors.line import MS, NS_PER_S
@@ -12,8 +12,10 @@ from sniff.analysis.json_text import iso as iso
 from sniff.analysis.sanitizing import ascii_of
 from sniff.analysis.wording import describe, duration, is_error
 from sniff.engine.session import Session
-from sniff.engine.verdict_join import JudgedRow
 from sniff.formats.parquet import Kind
+
+if TYPE_CHECKING:
+    from sniff.engine.verdict_join import JudgedRow
 
 JSON_KEYS = (
     "no", "t", "start_ns", "end_ns", "proto", "src", "dst", "role", "kind", "ok", "error", "found", "noise_before",

@@ -22,7 +22,6 @@ import numpy as np
 from dissectors import registry
 from dissectors.columns import Times
 from dissectors.frame import Chunk, Noise
-from sniff.analysis.rest_evidence import SECOND_BITS, second_in
 from sniff.engine.capture_error import CaptureError
 from sniff.engine.engine import Output, Row
 from sniff.engine.session import SECOND_NOTE, LineEvent, Session
@@ -122,6 +121,8 @@ class SecondProof:
         """Ask the sample, unless nothing came since the last time."""
         if not self._fresh:
             return
+        from sniff.analysis.rest_evidence import SECOND_BITS, second_in  # with the search: most buses leave nothing
+
         self._fresh = 0
         self._asked += 1
         session = self._session

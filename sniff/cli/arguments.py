@@ -12,7 +12,6 @@ from dissectors import registry
 from dissectors.line import LineSettings
 from dissectors.profiles import Devices, ProfileError
 from sniff.analysis.sanitizing import sanitized
-from sniff.analysis.told_protocol import detected
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.session import ASSUMED, AUTO, DEVICES_NOTE, LINE_NOTE, OPTIONS, PROTOCOL_NOTE, Session
@@ -188,10 +187,19 @@ def open_capture(path: str) -> Capture:
 def _opened(path: str) -> Capture:
     try:
         capture = read(path)
-        capture.session = detected(capture.session)
+        capture.session = _as_it_tells(capture.session)
         return capture
     except CaptureError as error:
         raise Failure(str(error), USAGE if "unknown suffix" in str(error) else UNREADABLE) from None
+
+
+def _as_it_tells(session: Session) -> Session:
+    """The session with what its octets say, where nobody else says it."""
+    if not (session.protocol_is_assumed or session.line_is_assumed):
+        return session
+    from sniff.analysis.told_protocol import detected  # most captures say what they are
+
+    return detected(session)
 
 
 def open_buses(path: str) -> list[tuple[str, Capture]]:
@@ -246,7 +254,7 @@ def _searched(args: argparse.Namespace, session: Session) -> Session:
     if not any(asked.values()) or session.unknown:
         return session
     notes = {**session.notes, **{note: ASSUMED for note, wanted in asked.items() if wanted}}
-    return detected(replace(session, notes=notes))
+    return _as_it_tells(replace(session, notes=notes))
 
 
 def say_assumed(session: Session, path: str, way_out: str = "") -> None:
