@@ -3,19 +3,12 @@
 from __future__ import annotations
 
 from dissectors.bacnet import ring_table
-from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.fields import fields
-from dissectors.bacnet.findings import MstpFindings, judge
 from dissectors.bacnet.frame_types import PREAMBLE
 from dissectors.bacnet.framing import MstpFramer
 from dissectors.bacnet.header import peek
 from dissectors.bacnet.readings import asks, readings
-from dissectors.bacnet.reassembly import Reassembler
-from dissectors.bacnet.renamer import MstpRenamer
-from dissectors.bacnet.ring import Ring
-from dissectors.bacnet.ring_observer import MstpRingObserver
-from dissectors.bacnet.ring_window import ring_window
 from dissectors.bacnet.rules import RULES
 from dissectors.bacnet.text import meant, text
 from dissectors.bacnet.tracker import MstpTracker
@@ -26,14 +19,9 @@ from dissectors.token_ring import TokenRing
 
 __all__ = [
     "MSTP",
-    "MstpFindings",
     "MstpFramer",
-    "MstpRingObserver",
     "MstpTracker",
-    "Reassembler",
-    "Ring",
     "fields",
-    "judge",
     "packet",
     "peek",
     "text",
@@ -41,6 +29,10 @@ __all__ = [
 
 
 packet = on_first_use("dissectors.bacnet.packets:packet")
+judge = on_first_use("dissectors.bacnet.findings:MstpFindings")
+watch = on_first_use("dissectors.bacnet.bulk_ring_observer:BulkRingObserver")
+ring_window = on_first_use("dissectors.bacnet.ring_window:ring_window")
+renamer = on_first_use("dissectors.bacnet.renamer:MstpRenamer")
 stencil = on_first_use("dissectors.bacnet.stencils:mstp_stencil")
 kernel = on_first_use("dissectors.bacnet.kernel:kernel")
 field_types = on_first_use("dissectors.bacnet.field_types:types")
@@ -62,7 +54,7 @@ def sieve(octets: bytes) -> bool:
 
 
 RING = TokenRing(
-    observer=BulkRingObserver,
+    observer=watch,
     window=ring_window,
     order=lambda ring: ring.order,
     headings=ring_table.HEADINGS,
@@ -89,7 +81,7 @@ MSTP = Dissector(
     family="bacnet",
     bits=bits,
     sieve=sieve,
-    judge=MstpFindings,
+    judge=judge,
     rules=RULES,
     ring=RING,
     readings=readings,
@@ -105,7 +97,7 @@ MSTP = Dissector(
         snap_before=b"\x55\xff",
         ports=((47808, "BACnet/IP"),),
     ),
-    renamer=MstpRenamer,
+    renamer=renamer,
     makers={"mstp": frame},
     kernel=kernel,
     pairing=pairing,

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dissectors.bacnet.ring import Ring, RingEventKind
+from typing import TYPE_CHECKING
+
 from dissectors.findings import counted
 from dissectors.histogram import Histogram
 from dissectors.line import MS
 from dissectors.token_ring import Cell
 from dissectors.words import milliseconds
+
+if TYPE_CHECKING:
+    from dissectors.bacnet.ring import Ring, RingEventKind
 
 HEADINGS = (
     "MAC",
@@ -40,6 +44,8 @@ def rows(ring: Ring) -> list[tuple[Cell, ...]]:
 
 
 def _row(ring: Ring, mac: int, following: int | None) -> tuple[Cell, ...]:
+    from dissectors.bacnet.ring import RingEventKind  # a bus of which nobody asks for the ring has none
+
     node = ring.nodes[mac]
     return (
         mac,

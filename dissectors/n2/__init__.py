@@ -6,12 +6,10 @@ from dissectors.frame import Frame
 from dissectors.manifest import Dissector, on_first_use
 from dissectors.n2.envelope import make_answer, make_command
 from dissectors.n2.fields import answer_fields, fields
-from dissectors.n2.findings import N2Findings
 from dissectors.n2.framing import N2Framer
 from dissectors.n2.header import peek
 from dissectors.n2.interpretation import Interpretation, interpret
 from dissectors.n2.readings import asks, readings, refusal, spans
-from dissectors.n2.renamer import N2Renamer
 from dissectors.n2.rules import RULES
 from dissectors.n2.text import meant, text
 from dissectors.n2.tracker import N2Tracker
@@ -20,7 +18,6 @@ from dissectors.questions import Questions
 __all__ = [
     "N2",
     "Interpretation",
-    "N2Findings",
     "N2Framer",
     "N2Tracker",
     "fields",
@@ -73,7 +70,7 @@ N2 = Dissector(
     spans=spans,
     refusal=refusal,
     questions=questions,
-    renamer=N2Renamer,
+    renamer=on_first_use("dissectors.n2.renamer:N2Renamer"),
     makers={"n2": make_command, "n2-answer": make_answer},
     scenarios=on_first_use("dissectors.n2.scenario:scenarios"),
     field_types=field_types,

@@ -9,8 +9,6 @@ from dissectors.profibus.fields import fields
 from dissectors.profibus.framing import STARTS, ProfibusFramer
 from dissectors.profibus.header import peek
 from dissectors.profibus.readings import readings
-from dissectors.profibus.renamer import ProfibusRenamer
-from dissectors.profibus.ring import ring_window
 from dissectors.profibus.rules import RULES
 from dissectors.profibus.telegram import telegram, token
 from dissectors.profibus.text import line_meant, text
@@ -41,7 +39,7 @@ def sieve(octets: bytes) -> bool:
 
 RING = TokenRing(
     observer=watch,
-    window=ring_window,
+    window=on_first_use("dissectors.profibus.ring:ring_window"),
     order=lambda ring: ring.order,
     headings=ring_words.HEADINGS,
     rows=ring_words.rows,
@@ -70,7 +68,7 @@ PROFIBUS = Dissector(
     ring=RING,
     readings=readings,
     packet_file=PacketFile((147,), least=1),
-    renamer=ProfibusRenamer,
+    renamer=on_first_use("dissectors.profibus.renamer:ProfibusRenamer"),
     scenarios=on_first_use("dissectors.profibus.scenario:scenarios"),
     kernel=kernel,
     pairing=pairing,

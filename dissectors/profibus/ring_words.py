@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from dissectors.findings import counted
 from dissectors.line import MS, NS_PER_S
-from dissectors.profibus.ring import Ring, SlaveRow
 from dissectors.token_ring import Cell
+
+if TYPE_CHECKING:
+    from dissectors.profibus.ring import Ring, SlaveRow
 
 HEADINGS = (
     "master",

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from dissectors.bacnet import MSTP, MstpRingObserver, judge
+from dissectors.bacnet import MSTP
+from dissectors.bacnet.findings import judge
 from dissectors.bacnet.ring import Ring
+from dissectors.bacnet.ring_observer import MstpRingObserver
 from dissectors.bacnet.simulated import SimulatedNode
 from dissectors.findings import Finding
 from dissectors.frame import Chunk, Event, Frame, Header

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from dissectors.bacnet import MSTP, MstpRingObserver, judge
+from dissectors.bacnet import MSTP
 from dissectors.bacnet.envelope import frame, npdu_frame
+from dissectors.bacnet.findings import judge
 from dissectors.bacnet.ring import Ring
+from dissectors.bacnet.ring_observer import MstpRingObserver
 from dissectors.bacnet.rules import RULES
 from dissectors.findings import Finding, Severity, with_consequences
 from dissectors.frame import Chunk, Event, Frame

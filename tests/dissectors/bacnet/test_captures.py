@@ -6,11 +6,13 @@ from typing import Any
 
 import pytest
 
-from dissectors.bacnet import MSTP, MstpRingObserver, fields, judge, packet, peek, text
+from dissectors.bacnet import MSTP, fields, packet, peek, text
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import message as messages
 from dissectors.bacnet import npdu as npdus
+from dissectors.bacnet.findings import judge
 from dissectors.bacnet.names import CONFIRMED
+from dissectors.bacnet.ring_observer import MstpRingObserver
 from dissectors.bacnet.values import ObjectId
 from dissectors.checksums import crc8_mstp
 from dissectors.frame import Check, Chunk, Damage, Event, Frame, Noise, Reason, Role

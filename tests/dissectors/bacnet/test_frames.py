@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from dissectors.bacnet import MSTP, MstpRingObserver, fields, packet, peek, text
+from dissectors.bacnet import MSTP, fields, packet, peek, text
 from dissectors.bacnet import message as messages
 from dissectors.bacnet import packets as layers
 from dissectors.bacnet.envelope import frame, npdu_frame
@@ -25,6 +25,7 @@ from dissectors.bacnet.packets import (
     dissect,
     parameters,
 )
+from dissectors.bacnet.ring_observer import MstpRingObserver
 from dissectors.frame import Check, Chunk, Event, Frame, Role
 from tests.dissectors.bacnet.captures import TIMING, drive, frame_of, tagged_frames
 from tests.seeds import examples

@@ -7,8 +7,10 @@ from random import Random
 
 import pytest
 
-from dissectors.bacnet import MSTP, MstpRingObserver, judge
+from dissectors.bacnet import MSTP
 from dissectors.bacnet.envelope import frame
+from dissectors.bacnet.findings import judge
+from dissectors.bacnet.ring_observer import MstpRingObserver
 from dissectors.bacnet.simulated import Faults, Poller, SimulatedNode, f510
 from dissectors.findings import Severity
 from dissectors.frame import Chunk, Frame

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dissectors.bacnet import MSTP, Reassembler
+from dissectors.bacnet import MSTP
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet.apdu import SEGMENTED_ACCEPTED, SERVER, Apdu
 from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.frame_types import CARRIES_NPDU
 from dissectors.bacnet.npdu import EXPECTS_REPLY
 from dissectors.bacnet.readings import readings
-from dissectors.bacnet.reassembly import OCTETS_MAX, OPEN_MAX
+from dissectors.bacnet.reassembly import OCTETS_MAX, OPEN_MAX, Reassembler
 from dissectors.findings import Finding
 from dissectors.frame import Assembly, Chunk, Frame, Role
 from dissectors.tracker import Transaction, Verdict

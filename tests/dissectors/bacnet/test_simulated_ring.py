@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from dissectors.bacnet import MstpRingObserver, judge
+from dissectors.bacnet.findings import judge
 from dissectors.bacnet.ring import Ring, RingEventKind
+from dissectors.bacnet.ring_observer import MstpRingObserver
 from dissectors.bacnet.simulated import Device, Faults, Poller, SimulatedNode, f510
 from dissectors.findings import Severity
 from dissectors.frame import Frame

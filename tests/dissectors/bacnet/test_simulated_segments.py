@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from dissectors.bacnet import Reassembler
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet.application import thing
+from dissectors.bacnet.reassembly import Reassembler
 from dissectors.bacnet.segmenting import RETRIES, SEGMENT_TIMEOUT, SegmentReceiver, SegmentSender
 from dissectors.bacnet.simulated import Device, Faults, Poller, SimulatedNode
 from dissectors.bacnet.values import ObjectId

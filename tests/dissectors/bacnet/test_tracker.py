@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dissectors.bacnet import MSTP, Reassembler
+from dissectors.bacnet import MSTP
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet.apdu import MORE_FOLLOWS, SEGMENTED
 from dissectors.bacnet.envelope import frame, npdu_frame
+from dissectors.bacnet.reassembly import Reassembler
 from dissectors.frame import Chunk, Event, Frame, Role
 from dissectors.line import LineSettings, Timing
 from dissectors.tracker import Placement, Transaction, Verdict

@@ -17,9 +17,10 @@ import pytest
 from bacpypes3.pdu import PDU
 from bacpypes3.primitivedata import TagList
 
-from dissectors.bacnet import Reassembler, fields, peek
 from dissectors.bacnet import apdu as apdus
+from dissectors.bacnet import fields, peek
 from dissectors.bacnet import message as messages
+from dissectors.bacnet.reassembly import Reassembler
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.bus.capture_writer import create

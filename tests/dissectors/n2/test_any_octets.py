@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from dissectors.checksums import sum8
 from dissectors.frame import Check, Damage, FoundBy, Frame, Role
 from dissectors.line import Timing
-from dissectors.n2 import N2Findings, N2Tracker, fields, interpret, packet, peek, text
+from dissectors.n2 import N2Tracker, fields, interpret, packet, peek, text
+from dissectors.n2.findings import N2Findings
 from dissectors.n2.framing import judge
 from dissectors.n2.objects import Encoding, decode, encode
 from dissectors.n2.simulated import Follower, Master, command, readings

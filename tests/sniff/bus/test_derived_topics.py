@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from dissectors import registry
-from dissectors.bacnet import MstpRingObserver
 from dissectors.bacnet.ring import RingEventKind
+from dissectors.bacnet.ring_observer import MstpRingObserver
 from dissectors.simulated_faults import LostResponse
 from sniff.analysis.judging import Judging
 from sniff.bus.derived_topics import BUS, NODE, BusChannels
