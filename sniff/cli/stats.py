@@ -18,12 +18,10 @@ from dissectors import registry
 from dissectors.histogram import Histogram
 from dissectors.line import MS, NS_PER_S
 from dissectors.tracker import Verdict
-from sniff.analysis.health import HealthReport
 from sniff.analysis.load import Second
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import station_word
-from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
 from sniff.bus.row_words import iso
 from sniff.cli import USAGE, Failure, arguments, filtering, tables, watching
@@ -33,6 +31,11 @@ from sniff.editing.merging import Merged, merged_session
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent, Session
+
+if TYPE_CHECKING:
+    from sniff.analysis.health import HealthReport
+    from sniff.bus.model import BusModel
+    from sniff.engine.table import Table
 
 TABLES = ("nodes", "health", "transactions", "latency", "load", "ring", "stations", "polls")
 
@@ -89,6 +92,8 @@ def run(args: argparse.Namespace) -> int:
         return ring.show(Watched(source), session, shown, args.style, args.reference)
     if table == "health":
         devices = arguments.noted_devices(args, session)
+        from sniff.bus.model import BusModel  # with the rules: other tables count only
+
         model = BusModel(session, dissector_for(session), devices, with_points=False)
         survey(Watched(source), session, model, reference=args.reference)
         tables.write(HEALTH_HEADINGS, _health(model.health(), station_word(session.protocol)), args.style)
@@ -168,9 +173,6 @@ def _show_ring(model: BusModel, table: str, style: str) -> None:
     else:
         print(f"{model.session.protocol} has masters only", file=sys.stdout if style == "text" else sys.stderr)
 
-
-if TYPE_CHECKING:
-    from sniff.engine.table import Table
 
 NODE_HEADINGS = (
     "address",
