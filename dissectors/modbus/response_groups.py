@@ -14,7 +14,6 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from statistics import median
 
 from dissectors.histogram import width
 from dissectors.quick_values import quickly_made
@@ -80,6 +79,8 @@ class SameRequest:
         again by the bounds that the adapter leaves; None while they are too few."""
         if len(self.first) < _FIRST_KEPT or len(self.answers) < 2 * _FIRST_KEPT:
             return None
+        from statistics import median  # with fractions, decimals and random numbers
+
         last = [answer.latency for answer in self.answers][-_FIRST_KEPT:]
         before, after = median([one.high for one in self.first]), median([one.low for one in last])
         return round(after - before) if 2 * after > 3 * before else 0
