@@ -2,6 +2,6 @@
 
 import sys
 
-from sniff.cli import main
+from sniff.cli.process import run
 
-sys.exit(main())
+sys.exit(run())
