@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from sniff.analysis.sanitizing import sanitized
 from sniff.cli import arguments
-from sniff.formats.table import suffixes
+from sniff.formats.table import is_named_so
 
 if TYPE_CHECKING:
     from sniff.analysis.point_reader import Sample
@@ -50,7 +50,7 @@ def port_of(sources: Sequence[str]) -> str | None:
 def is_file(source: str) -> bool:
     """Whether it is what captures are read from."""
     path = Path(source)
-    return source == "-" or path.is_file() or path.is_fifo() or source.lower().endswith(suffixes())
+    return source == "-" or is_named_so(source) or path.is_file() or path.is_fifo()
 
 
 def is_port(source: str) -> bool:

@@ -165,6 +165,11 @@ def suffixes() -> tuple[str, ...]:
     return tuple(dict.fromkeys(suffix for one in formats() if one.reader for suffix in one.suffixes))
 
 
+def is_named_so(name: str) -> bool:
+    """Whether a name ends in one of `suffixes`. For one of ours nobody looks what other packages bring."""
+    return any(one.reader and one.named(name) for one in BUILT_IN) or name.lower().endswith(suffixes())
+
+
 def names() -> Iterable[str]:
     """Names of everything that can be read."""
     return (one.name for one in formats() if one.reader)
