@@ -16,12 +16,13 @@ from dissectors.columns import ROLES
 from dissectors.frame import Frame, Role
 from dissectors.line import MS
 from dissectors.modbus.envelope import RTU_NAME
+from dissectors.modbus.exchanged import Exchanged
 from dissectors.modbus.gap_columns import hurried, see_close, see_spacing, silences, turns_before
 from dissectors.modbus.gaps import sender_name
 from dissectors.modbus.observer import ModbusFindings
 from dissectors.modbus.regular_exchanges import UNANSWERED, adus_of, regular
 from dissectors.modbus.remembered import FINAL_KEPT, OPEN_KEPT
-from dissectors.modbus.stretch_evidence import Exchanged, StretchEvidence
+from dissectors.modbus.stretch_evidence import StretchEvidence
 from dissectors.row_columns import in_turn
 
 if TYPE_CHECKING:

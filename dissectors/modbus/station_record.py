@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from dissectors.findings import Tally
 from dissectors.frame import Flaw
@@ -21,6 +22,7 @@ SAME_KEPT = 8
 _BLOCKS = 64
 _CHECKS_KEPT = 64
 _NEARLY_ALL = 4  # of five
+_PERIODS = 256
 
 Key = tuple[str, int | None]
 """A request as a poll list has it: kind and first register."""
@@ -314,8 +316,27 @@ class Cycles:
             return
         periods = self._periods.get(octets)
         if periods is None:
-            periods = self._periods[octets] = deque(maxlen=256)
+            periods = self._periods[octets] = deque(maxlen=_PERIODS)
         periods.append(start - before)
+
+    def again(self, octets: bytes, key: Key, starts: list[int]) -> tuple[int, list[int]] | None:
+        """Take one request that came several times, in order; its periods, which are to be kept in the order in which
+        the first of each ended, and at which of the starts that was. None where it has none."""
+        before = self._last.get(octets)
+        if before is None and len(self._last) >= KEYS_KEPT:
+            return None
+        self._last[octets] = starts[-1]
+        self._keys[octets] = key
+        times = starts if before is None else [before, *starts]
+        periods = [after - earlier for earlier, after in pairwise(times)]
+        first = next((at for at, period in enumerate(periods) if period > 0), None)
+        if first is None:
+            return None
+        return first + (before is None), [period for period in periods if period > 0]
+
+    def keep(self, octets: bytes, periods: list[int]) -> None:
+        """Keep periods of a request."""
+        self._periods.setdefault(octets, deque(maxlen=_PERIODS)).extend(periods)
 
     def asked_of(self, unit: int) -> list[bytes]:
         """What a unit is asked."""

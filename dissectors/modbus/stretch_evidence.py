@@ -1,120 +1,35 @@
-"""Evidence about the stations in a stretch of regular exchanges (`regular_exchanges.py`), one by one."""
+"""Evidence about the stations in a stretch of regular exchanges.
+
+Many in a row are taken together where there is nothing to say of them but that they were answered, all others one by
+one.
+"""
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dissectors.frame import Frame
-from dissectors.modbus.asked import AskedRequest
 from dissectors.modbus.exchange_columns import SAMPLES
+from dissectors.modbus.exchanged import Exchanged
 from dissectors.modbus.learned_timing import READ
 from dissectors.modbus.long_silences import SILENCE_LEAST
 from dissectors.modbus.regular_exchanges import REFUSED, TO_ALL, UNANSWERED
 from dissectors.modbus.remembered import BEGIN, LAST_STANDARD_UNIT, OPEN_KEPT, SLOW_UNLEARNT, slow_limit
-from dissectors.modbus.response_groups import AnsweredRequest, SameRequest
+from dissectors.modbus.response_groups import SameRequest
 from dissectors.modbus.station_record import Key, Requested, StationRecord
 from dissectors.rhythm import TURNS_KEPT
-from dissectors.tracker import Interval, Transaction
 
 if TYPE_CHECKING:
-    from dissectors.columns import Times, TransactionColumns
+    from dissectors.columns import Times
+    from dissectors.modbus.exchanged import Exchanged
     from dissectors.modbus.observer import ModbusFindings
-    from dissectors.modbus.regular_exchanges import Adus, Regular
-    from dissectors.row_columns import RowColumns
 
 
-@dataclass(frozen=True, slots=True)
-class Exchanged:
-    """Regular exchanges as lists, which a loop reads faster than arrays, by place among them.
-
-    `octets`: unit and PDU of all frames; those of a request stand in [begin, end), of an answer in [answer_begin,
-    answer_end). `request`, `last`: rows. `copy`: whether the answer says what the request said. Times and readings: ns.
-    """
-
-    rows: RowColumns
-    found: Regular
-    closed: TransactionColumns
-    octets: bytes
-    copy: list[bool]
-    request: list[int]
-    last: list[int]
-    begin: list[int]
-    end: list[int]
-    answer_begin: list[int]
-    answer_end: list[int]
-    unit: list[int]
-    kind: list[int]
-    address: list[int]
-    became: list[int]
-    started: list[int]
-    ended: list[int]
-    low: list[int]
-    nominal: list[int]
-    high: list[int]
-
-    @classmethod
-    def of(cls, rows: RowColumns, found: Regular, adus: Adus) -> Self:
-        """Of some rows."""
-        request, last = found.request, found.request + found.answered
-        closed = rows.transactions.take(found.transaction)
-        ends = adus.offset + adus.length
-        columns = (
-            request,
-            last,
-            adus.offset[request],
-            ends[request],
-            adus.offset[last],
-            ends[last],
-            closed.station,
-            rows.frames.kind[request],
-            rows.frames.address[request],
-            found.became,
-            closed.start,
-            closed.end,
-            closed.least,
-            closed.latency,
-            closed.most,
-        )
-        octets = adus.octets.tobytes()
-        same = found.answered & ~found.refused & (adus.length[request] == adus.length[last])
-        copies = [False] * len(found)
-        for at in np.flatnonzero(same).tolist():
-            asked, came, size = int(columns[2][at]), int(columns[4][at]), int(adus.length[request[at]])
-            copies[at] = octets[asked : asked + size] == octets[came : came + size]
-        return cls(rows, found, closed, octets, copies, *(column.tolist() for column in columns))
-
-    def said(self, at: int) -> bytes:
-        """Unit and PDU of a request."""
-        return self.octets[self.begin[at] : self.end[at]]
-
-    def answer(self, at: int) -> bytes:
-        """Unit and PDU of an answer."""
-        return self.octets[self.answer_begin[at] : self.answer_end[at]]
-
-    def key(self, at: int) -> Key:
-        """What a request asks for, as a poll list has it."""
-        address = self.address[at]
-        return self.rows.frames.names[self.kind[at]], None if address < 0 else address
-
-    def asked(self, at: int) -> AskedRequest:
-        """A request as the rules see it."""
-        row = self.rows.row(self.request[at])
-        assert isinstance(row.event, Frame)
-        assert row.header is not None
-        return AskedRequest(row.no, row.event, row.header, self.said(at))
-
-    def transaction(self, at: int) -> Transaction:
-        """As it closed."""
-        return self.rows.transaction(int(self.found.transaction[at]))
-
-    def answered(self, at: int) -> AnsweredRequest:
-        """An answer, to be compared with others."""
-        latency = Interval(self.nominal[at], self.low[at], self.high[at])
-        return AnsweredRequest(self.rows.first + self.last[at], self.ended[at], latency, self.answer(at))
+MANY = 64
+"""Exchanges in a row from which on it is worth while to take them together."""
 
 
 @dataclass(slots=True)
@@ -172,6 +87,28 @@ class StretchEvidence:
         self._turns = turns
         self._pause_rows, self._pauses, self._hurried, self._paused = pause_rows, pauses, set(hurried), 0
         self._learn_timeout()
+        one, place, late_speakers = self._exchanged, begin, self._judge.seen.late_speakers
+        while place < end:
+            plain, behind = self._plain_segment(place, end)
+            known = self._timeout, late_speakers.until
+            self._one_by_one(place, plain)
+            place = plain
+            if plain < behind and known == (self._timeout, late_speakers.until):  # else what is plain is asked anew
+                self._together(plain, behind)
+                place = behind
+        if min(one.became[begin:end]) <= REFUSED:
+            self._judge.seen.strikes.whole()
+        self._pause_until(one.last[end - 1])
+        self._count_all()
+        for request in self._compared:
+            if request.answers and request.same is not None:
+                request.same.add([one.answered(at) for at in request.same.needed(request.answers)])
+                request.answers.clear()
+
+    def _one_by_one(self, begin: int, end: int) -> None:
+        """Take exchanges [begin, end), each as what it is."""
+        if begin == end:
+            return
         one, cycles, requests = self._exchanged, self._judge.seen.cycles, self._requests
         octets, begins, ends, became, low = one.octets, one.begin, one.end, one.became, one.low
         address, kind, started = one.address, one.kind, one.started
@@ -192,7 +129,7 @@ class StretchEvidence:
                 continue
             request = requests.get(said)
             if request is None or request.address != address[at] or request.kind != kind[at]:
-                request = self._new_request(at, said)
+                request = self._request(at, said)
             if started[at] < late_speakers.until:
                 late_speakers.answered(one.unit[at], f"station {one.unit[at]}", started[at])
             requested = request.requested
@@ -213,14 +150,83 @@ class StretchEvidence:
                 request.answers.append(at)
             elif request.is_new:
                 self._compare(at, said, request)
-        if min(became[begin:end]) <= REFUSED:
-            self._judge.seen.strikes.whole()
-        self._pause_until(one.last[end - 1])
-        self._count_all()
-        for request in self._compared:
-            if request.answers and request.same is not None:
-                request.same.add([one.answered(at) for at in request.same.needed(request.answers)])
-                request.answers.clear()
+
+    # ---- many in a row of which there is nothing to say but that they were answered
+
+    def _plain_segment(self, begin: int, end: int) -> tuple[int, int]:
+        """The first exchanges in [begin, end), MANY at least, that were all answered or refused, not slowly, and of
+        which none ends the wait of another or shows who speaks late; nothing at `end` where there are none."""
+        if end - begin < MANY:
+            return end, end
+        one, which = self._exchanged, slice(begin, end)
+        closed, became = one.closed, one.found.became[which]
+        plain = (became <= REFUSED) & (closed.least[which] <= self._slow)
+        plain &= closed.station[which] <= LAST_STANDARD_UNIT
+        plain &= closed.start[which] >= self._judge.seen.late_speakers.until
+        plain[1:] &= became[:-1] != UNANSWERED
+        if self._timeout is not None:
+            plain &= closed.latency[which] <= self._timeout
+        edges = np.flatnonzero(np.diff(plain, prepend=False, append=False))
+        long = np.flatnonzero(edges[1::2] - edges[::2] >= MANY)
+        if not len(long):
+            return end, end
+        first, behind = edges[2 * int(long[0]) : 2 * int(long[0]) + 2].tolist()
+        return begin + first, begin + behind
+
+    def _together(self, begin: int, end: int) -> None:
+        """Take the exchanges of such a segment, request by request in the order in which each came first."""
+        one, cycles = self._exchanged, self._judge.seen.cycles
+        octets, which = one.octets, slice(begin, end)
+        numbers: dict[bytes, int] = {}
+        limits = zip(one.begin[which], one.end[which], strict=True)
+        same = np.fromiter((numbers.setdefault(octets[a:b], len(numbers)) for a, b in limits), np.int64, end - begin)
+        order = np.argsort(same, kind="stable")
+        behind = np.cumsum(np.bincount(same))
+        first = order[np.append(0, behind[:-1])]
+        address, kind = (column[one.found.request[which]] for column in (one.rows.frames.address, one.rows.frames.kind))
+        if (address != address[first[same]]).any() or (kind != kind[first[same]]).any():
+            self._one_by_one(begin, end)  # the same octets, read in two ways
+            return
+        refused = one.found.became[which] == REFUSED
+        places, started = (begin + order).tolist(), one.closed.start[which][order].tolist()
+        is_refused = refused[order].tolist() if refused.any() else []
+        answered: list[tuple[bytes, _Request, list[int]]] = []
+        periods: list[tuple[int, bytes, list[int]]] = []
+        at = 0
+        for said, stop in zip(numbers, behind.tolist(), strict=True):
+            asked = places[at:stop]
+            request = self._request(asked[0], said)
+            request.requested.tries += stop - at
+            request.requested.turns += stop - at
+            period = cycles.again(said, request.key, started[at:stop])
+            if period is not None:
+                periods.append((asked[period[0]], said, period[1]))
+            if request.same is not None or request.is_new:
+                if True in is_refused[at:stop]:
+                    asked = [place for place, no in zip(asked, is_refused[at:stop], strict=True) if not no]
+                if asked:
+                    answered.append((said, request, asked))
+            at = stop
+        for _, said, each in sorted(periods):
+            cycles.keep(said, each)
+        for place in (begin + np.flatnonzero(refused)).tolist():
+            self._refused(place, self._requests[octets[one.begin[place] : one.end[place]]].key)
+        unit = one.closed.station[which]
+        for took in self._took.values():
+            took.exchanges.extend((begin + np.flatnonzero(unit == took.unit)).tolist())
+        answered.sort(key=lambda each: each[2][0])
+        for said, request, answers in answered:
+            if request.is_new and request.same is None:
+                self._compare(answers.pop(0), said, request)
+            if request.same is not None:
+                request.answers += answers
+
+    def _request(self, at: int, said: bytes) -> _Request:
+        """The record of what an exchange asks."""
+        request, one = self._requests.get(said), self._exchanged
+        if request is None or request.address != one.address[at] or request.kind != one.kind[at]:
+            request = self._new_request(at, said)
+        return request
 
     # ---- what is rarer
 
