@@ -45,6 +45,8 @@ class RingCounts:
         self._polls = np.flatnonzero(columns.poll)
         self._pairs = columns.source[self._polls] << 8 | columns.destination[self._polls]
         self._asked, self._replies = np.flatnonzero(columns.asked), np.flatnonzero(columns.poll_reply)
+        self._asked_whom, self._replied = columns.destination[self._asked], columns.source[self._replies]
+        self._polling = self._pairs >> 8
         self._known: tuple[set[int], ...] = (set(), set(), set(), set(), set())
         # what the first token of a run says, by station
         self._loops: list[tuple[int, int]] = []
@@ -62,7 +64,6 @@ class RingCounts:
             node = nodes.get(mac)
             return node is not None and bool(node.polls_sent and node.tokens_sent)
 
-        asked, replies = columns.destination[self._asked], columns.source[self._replies]
         is_known: tuple[Callable[[int], object], ...] = (
             lambda mac: mac in nodes and nodes[mac].first,
             lambda edge: (edge >> 8, edge & 0xFF) in edges,
@@ -73,9 +74,9 @@ class RingCounts:
         keyed = (
             (np.arange(begin, end), columns.source[begin:end]),
             self._of(self._tokens, self._edges, begin, end),
-            self._of(self._asked, asked, begin, end),
-            self._of(self._polls, self._pairs >> 8, begin, end),
-            self._of(self._replies, replies, begin, end),
+            self._of(self._asked, self._asked_whom, begin, end),
+            self._of(self._polls, self._polling, begin, end),
+            self._of(self._replies, self._replied, begin, end),
         )
         firsts: list[int] = []
         for (places, keys), known, ask in zip(keyed, self._known, is_known, strict=True):
