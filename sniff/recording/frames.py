@@ -1,8 +1,8 @@
 """The /frames topic: what peek and the tracker found, as columns, for programs that do not dissect.
 
 Derived, never evidence: `McapCapture.frames` gives only what the very same version made (layout and program). Commands
-compute everything from /raw. A message holds a string table and three tables, `EVENTS`, `MARKS` and `TRANSACTIONS`; the layout
-is written into the schema record from these tables, so that the two cannot differ.
+compute everything from /raw. A message holds a string table and three tables, `EVENTS`, `MARKS` and `TRANSACTIONS`; the
+layout is written into the schema record from these tables, so that the two cannot differ.
 
 An event names its octets by their place in the stream of all octets of the recording (all parts), which is the same
 thing in /raw and here because a framer loses none.
