@@ -26,6 +26,21 @@ MOST_OFFERED = 8
 _LAST_WORD = re.compile(r"[A-Za-z_][\w.]*$")
 
 
+class AskedOnce:
+    """Ways in which a filter may go on, worked out once for a text: suggestion, list and enter ask the same."""
+
+    def __init__(self, complete: Complete) -> None:
+        self._complete = complete
+        self._text: str | None = None
+        self._ways: Sequence[Completion] = ()
+
+    def __call__(self, text: str) -> Sequence[Completion]:
+        """The ways."""
+        if text != self._text:
+            self._text, self._ways = text, self._complete(text)
+        return self._ways
+
+
 class FilterSuggester(Suggester):
     """Completes a filter: the first way to go on (tab or → takes it)."""
 
@@ -111,10 +126,11 @@ class Prompt(Vertical):
         """Open with a text to edit; `hint` is shown while it is empty. `complete`: ways in which a filter may go on.
         `before`: what was answered earlier, the latest last."""
         self.purpose = purpose
-        self._check, self._complete = check, complete
+        self._check, self._complete = check, AskedOnce(complete) if complete is not None else None
         self._before, self._at = before, len(before)
         field = self.query_one(Input)
-        field.suggester = FilterSuggester(complete) if complete else WordSuggester(words) if words else None
+        asked = self._complete
+        field.suggester = FilterSuggester(asked) if asked else WordSuggester(words) if words else None
         field.placeholder = hint
         field.value = text
         field.cursor_position = len(text)

@@ -10,7 +10,8 @@ import pytest
 from dissectors.frame import Role
 from dissectors.tracker import Transaction, Verdict
 from sniff.engine.engine import Output
-from sniff.tui.prompt import Prompt
+from sniff.filter.completion import Completion
+from sniff.tui.prompt import AskedOnce, Prompt
 from sniff.tui.view_state import Viewing
 
 
@@ -321,3 +322,15 @@ def test_saved_filters_by_name_and_colours(look: Any, busy_bus: Any, tmp_path: A
         assert see.app.viewing.colour_of(row, store.transaction(row)) == "magenta"
 
     look(busy_bus.store, script)
+
+
+def test_how_a_filter_may_go_on_is_worked_out_once_for_a_text() -> None:
+    asked: list[str] = []
+
+    def complete(text: str) -> list[Completion]:
+        asked.append(text)
+        return [Completion(text + "0", text + "0", None)]
+
+    ways = AskedOnce(complete)
+    assert [ways(text)[0].text for text in ("a", "a", "ab", "a")] == ["a0", "a0", "ab0", "a0"]
+    assert asked == ["a", "ab", "a"]
