@@ -221,12 +221,8 @@ def _damaged(frames: FrameColumns, octets: Octets, asks: Masks) -> tuple[Masks, 
     wrong = wrong[frames.chained[wrong] & frames.chained[wrong + 1]]
     place = frames.offset
     asked, following = wrong - 1, wrong + 1
-    right = (
-        asks[asked]
-        & asks[following]
-        & (frames.role[wrong] != _REQUEST)
-        & _same_unit_and_code(octets, place, asked, wrong)
-    )
+    right = asks[asked] & asks[following] & (frames.role[wrong] != _REQUEST)
+    right &= _same_unit_and_code(octets, place, asked, wrong)
     right &= (frames.length[wrong] >= frames.length[asked]) | (  # else it may be the begin of an echo
         octets[place[wrong] + 2] != octets[place[asked] + 2]
     )

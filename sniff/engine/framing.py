@@ -188,28 +188,28 @@ class _Work:
             if begin >= self._doubted and isinstance(event, Frame) and event.ok and self._columns is not None:
                 row = int(np.searchsorted(self._columns.offset, begin))
                 if row < len(self._columns) and self._columns.offset[row] == begin:
-                    end = self._take_up(row, event, fed, events[number:])
+                    end = self._take_up(row, fed, events, number)
                     if end is not None:
                         return end
         return None
 
-    def _take_up(self, row: int, event: Frame, fed: int, following: list[Event]) -> int | None:
-        """Take up the chain behind a row that the reference gave as `event`, and `following` behind it."""
+    def _take_up(self, row: int, fed: int, events: list[Event], number: int) -> int | None:
+        """Take up the chain behind a row that the reference gave, as the last of the first `number` of some events."""
         columns, last = self._columns, self._last
         assert columns is not None
         assert last is not None
         end = int(last[row]) + 1
-        if end - row - 1 < SHORTEST or columns.length[row] != len(event.octets):
+        if end - row - 1 < SHORTEST or columns.length[row] != len(events[number - 1].octets):
             return None
         if int(columns.offset[end - 1]) + int(columns.length[end - 1]) <= fed:  # the framer has read it all already
             return None
         earlier = self._framing._framer
         few = earlier.primed if isinstance(earlier, Remembering) else PRIMED
         for primed in (few, MANY, end - row):
-            first = self._with_request(row, max(row, end - primed), not following)
+            first = self._with_request(row, max(row, end - primed), number == len(events))
             if first is not None and self._prime(slice(row + 1, max(row + 1, first)), slice(first, end)):
                 self._end_events()
-                self._newest = _TakenUp(row, end, len(self._stretches), earlier, following, fed)
+                self._newest = _TakenUp(row, end, len(self._stretches), earlier, events[number:], fed)
                 self._stretches.append(Clean(columns, self._reads.octets, row + 1, end))
                 stop = int(columns.offset[end - 1]) + int(columns.length[end - 1])
                 self._framing._given = self._framing._base + stop
