@@ -15,7 +15,6 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from itertools import groupby
 
 from dissectors import registry
 from dissectors.frame import Chunk, Frame
@@ -154,7 +153,7 @@ def noise_of(session: Session, protocol: str, line: LineSettings) -> list[list[C
     events = [row.event for output in outputs for row in output.rows]
     return [
         [Chunk(event.end, event.octets) for event in stretch]
-        for is_good, stretch in groupby(events, lambda event: isinstance(event, Frame) and event.ok)
+        for is_good, stretch in itertools.groupby(events, lambda event: isinstance(event, Frame) and event.ok)
         if not is_good
     ]
 

@@ -30,8 +30,8 @@ SHORTEST = 3
 """Rows that a chain must still hold for it to be worth taking up."""
 
 PRIMED, MANY = 6, 100
-"""Rows of a chain that a new framer is handed first, unless it remembers more; where it makes something else of the
-fewer."""
+"""Rows of a chain that a new framer is handed first, where it does not say itself how many it needs
+(`Remembering.primed`); those that it is handed where it makes something else of the fewer."""
 
 
 @dataclass(frozen=True, slots=True)
