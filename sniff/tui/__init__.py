@@ -13,13 +13,15 @@ def run(feed: Feed | Sequence[Feed], start_screen: str = "frames") -> None:
     """Show a feed, or those of several buses, until the user quits; then say where a recording is. Closes the feeds in
     every case."""
     from sniff.tui.app import SnifferApp
+    from sniff.tui.hangup import ending_at_hangup
 
     feeds = feed if isinstance(feed, Sequence) else [feed]
     try:
         app = SnifferApp(feeds, start_screen)
         app.is_alone = True
         gc.freeze()  # what was imported stays: looking through it again and again slows the first seconds
-        app.run()
+        with ending_at_hangup():
+            app.run()
         ended = [(status.port, status.ended) for status in (each.status() for each in feeds) if status.ended]
     finally:
         for each in feeds:
