@@ -114,8 +114,7 @@ class KeptTables:
             if len(table) >= PACKED:
                 table = PackedTable(table)
         if isinstance(table, PackedTable):  # most tables have the same texts
-            table.names = self._names.setdefault(table.names, table.names)
-            table.closed_names = self._names.setdefault(table.closed_names, table.closed_names)
+            table.share_names(self._names)
         part = Part(table, first, self.last_closed + 1)
         self.parts.append(part)
         self.last_no += part.rows

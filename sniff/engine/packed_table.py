@@ -9,7 +9,7 @@ from what its header says.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -107,28 +107,32 @@ def _width(span: int) -> int:
     return 1 if span < 1 << 8 else 2 if span < 1 << 16 else 4 if span < 1 << 32 else 8
 
 
-class PackedTable:
-    """A table that is only looked at. `first`, `odd`, `protocol`, and what a row is: as of a table.
+@dataclass(frozen=True, slots=True)
+class PackedParts:
+    """What a packed table is made of. `count`: of its rows; `closed`: of its transactions. `char`: ns of a character,
+    or nearly so: what an octet of a frame takes. `columns`: "frames.end", "slack" …; those are absent that follow from
+    others. The rest as of a table."""
 
-    `closed`: how many transactions. `ids`: the least and the greatest of theirs. `rows_closed`: the last row that they
-    name. `begin`: of the first row, ns; `begins`: of the first and the last in time. `placed_ids`: least and greatest
-    of the transactions that its rows belong to. `remembered`: what whoever keeps it has found out of its rows, and
-    from which tables.
-    """
+    protocol: str
+    first: int
+    count: int
+    closed: int
+    char: int
+    octets: Octets
+    names: tuple[str, ...]
+    closed_names: tuple[str, ...]
+    columns: Mapping[str, PackedColumn]
+    odd: Mapping[int, Row]
 
-    def __init__(self, table: Table) -> None:
-        self.remembered: dict[str, tuple[list[Any], Values]] = {}
+    @classmethod
+    def of(cls, table: Table) -> PackedParts:
+        """A table, taken apart."""
         frames, placed, closed = table.frames, table.placed, table.transactions
-        self.protocol, self.first, self.odd = table.protocol, table.first, table.odd
-        self.octets: Octets = table.octets if table.octets.base is None else table.octets.copy()
-        self.names, self.closed_names = frames.names, closed.names
-        self.closed = len(closed)
-        self._count = len(table)
         held = {f"frames.{name}": packed(getattr(frames, name)) for name in _FRAMES if name not in ("offset", "start")}
         if not np.array_equal(frames.offset, _begins(frames.length)):
             held["frames.offset"] = packed(frames.offset)
-        self._char = int((frames.end[0] - frames.start[0]) // max(1, int(frames.length[0]))) if len(table) else 0
-        held["frames.start"] = packed(frames.end - frames.start - np.int64(self._char) * frames.length)
+        char = int((frames.end[0] - frames.start[0]) // max(1, int(frames.length[0]))) if len(table) else 0
+        held["frames.start"] = packed(frames.end - frames.start - np.int64(char) * frames.length)
         held["slack"], held["is_frame"] = packed(table.slack), packed(table.is_frame)
         held["placed.tx"] = packed(placed.tx, none=0)
         for name in ("role", "source", "destination"):
@@ -143,7 +147,70 @@ class PackedTable:
                 values = values - closed.latency
             held[f"closed.{name}"] = packed(values, none=NONE if values.dtype == np.int64 else None)
         held["closed_by"] = packed(table.closed_by)
-        self._held = held
+        octets = table.octets if table.octets.base is None else table.octets.copy()
+        return cls(
+            table.protocol,
+            table.first,
+            len(table),
+            len(closed),
+            char,
+            octets,
+            frames.names,
+            closed.names,
+            held,
+            table.odd,
+        )
+
+    def column(self, name: str) -> Values:
+        """A column as a table has it: "frames.end", "placed.tx", "closed.verdict", "slack", "is_frame", "closed_by"."""
+        held = self.columns.get(name)
+        if name == "frames.start":
+            made: Values = self.column("frames.end")
+            apart = self.columns[name]
+            made = made - (apart.base if apart.narrow is None else apart.values())
+            made -= np.multiply(self.column("frames.length"), self.char, dtype=np.int64)
+            return made
+        if name == "closed.start":
+            return self.column("closed.end") - self.columns[name].values()
+        if name in ("closed.least", "closed.most"):
+            return self.column("closed.latency") + self.columns[name].values()
+        if held is not None:
+            return held.values()
+        if name == "frames.offset":
+            return _begins(self.column("frames.length"))
+        return _as_headers_say(self.column(name.replace("placed.", "frames.")), self.column("placed.tx"))
+
+    def table(self) -> Table:
+        """The table as it was."""
+        return Table(
+            self.protocol,
+            self.first,
+            self.octets,
+            FrameColumns(**{name: self.column(f"frames.{name}") for name in _FRAMES}, names=self.names),
+            self.column("slack"),
+            self.column("is_frame"),
+            PlacementColumns(*(self.column(f"placed.{name}") for name in _PLACED)),
+            TransactionColumns(**{name: self.column(f"closed.{name}") for name in _CLOSED}, names=self.closed_names),
+            self.column("closed_by"),
+            self.odd,
+        )
+
+
+class PackedTable:
+    """A table that is only looked at. `first`, `odd`, `protocol`, and what a row is: as of a table.
+
+    `closed`: how many transactions. `ids`: the least and the greatest of theirs. `rows_closed`: the last row that they
+    name. `begin`: of the first row, ns; `begins`: of the first and the last in time. `placed_ids`: least and greatest
+    of the transactions that its rows belong to. `remembered`: what whoever keeps it has found out of its rows, and
+    from which tables.
+    """
+
+    def __init__(self, table: Table) -> None:
+        self.remembered: dict[str, tuple[list[Any], Values]] = {}
+        parts = self._parts = PackedParts.of(table)
+        frames, placed, closed = table.frames, table.placed, table.transactions
+        self.protocol, self.first, self.odd = parts.protocol, parts.first, parts.odd
+        self.octets, self.closed = parts.octets, parts.closed
         ids, numbers = closed.id, np.concatenate((closed.request, closed.response))
         self.ids = (int(ids.min()), int(ids.max())) if len(ids) else (0, -1)
         self.rows_closed = int(numbers.max(initial=0))
@@ -153,35 +220,35 @@ class PackedTable:
         self._all_placed = bool((placed.tx > 0).all())
 
     def __len__(self) -> int:
-        return self._count
+        return self._parts.count
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Texts of its rows."""
+        return self._parts.names
+
+    @property
+    def closed_names(self) -> tuple[str, ...]:
+        """Texts of its transactions."""
+        return self._parts.closed_names
+
+    def share_names(self, known: dict[tuple[str, ...], tuple[str, ...]]) -> None:
+        """Keep texts once that other tables have, too. `known`: those so far."""
+        names, closed = (known.setdefault(one, one) for one in (self.names, self.closed_names))
+        self._parts = replace(self._parts, names=names, closed_names=closed)
 
     @property
     def memory(self) -> int:
         """Octets of memory that columns and the octets of the wire take."""
-        return self.octets.nbytes + sum(one.octets for one in self._held.values())
+        return self.octets.nbytes + sum(one.octets for one in self._parts.columns.values())
 
     def column(self, name: str) -> Values:
         """A column as a table has it: "frames.end", "placed.tx", "closed.verdict", "slack", "is_frame", "closed_by"."""
-        held = self._held.get(name)
-        if name == "frames.start":
-            made: Values = self.column("frames.end")
-            apart = self._held[name]
-            made = made - (apart.base if apart.narrow is None else apart.values())
-            made -= np.multiply(self.column("frames.length"), self._char, dtype=np.int64)
-            return made
-        if name == "closed.start":
-            return self.column("closed.end") - self._held[name].values()
-        if name in ("closed.least", "closed.most"):
-            return self.column("closed.latency") + self._held[name].values()
-        if held is not None:
-            return held.values()
-        if name == "frames.offset":
-            return _begins(self.column("frames.length"))
-        return _as_headers_say(self.column(name.replace("placed.", "frames.")), self.column("placed.tx"))
+        return self._parts.column(name)
 
     def ranks(self) -> tuple[Values, int]:
         """Which of `placed_ids` each row belongs to, and what is to be added: 1 is the least then, 0 is none."""
-        column = self._held["placed.tx"]
+        column = self._parts.columns["placed.tx"]
         least, _ = self.placed_ids
         narrow, base, missing = column.narrow, column.base, column.missing
         if narrow is None or missing not in (None, least - 1) or not (self._all_placed or missing is not None):
@@ -202,22 +269,11 @@ class PackedTable:
 
     def as_headers_say(self, name: str) -> bool:
         """Whether the tracker says of all rows that have a place what their headers say: "source", "role" …."""
-        return f"placed.{name}" not in self._held
+        return f"placed.{name}" not in self._parts.columns
 
     def table(self) -> Table:
         """The table as it was."""
-        return Table(
-            self.protocol,
-            self.first,
-            self.octets,
-            FrameColumns(**{name: self.column(f"frames.{name}") for name in _FRAMES}, names=self.names),
-            self.column("slack"),
-            self.column("is_frame"),
-            PlacementColumns(*(self.column(f"placed.{name}") for name in _PLACED)),
-            TransactionColumns(**{name: self.column(f"closed.{name}") for name in _CLOSED}, names=self.closed_names),
-            self.column("closed_by"),
-            self.odd,
-        )
+        return self._parts.table()
 
 
 def span_of(tx: Values) -> tuple[int, int]:
