@@ -23,7 +23,7 @@ from sniff.bus.columns import Column, ColumnForm, Columns, TableColumns
 from sniff.bus.sample_row import COLUMNS, sample_row
 from sniff.bus.second_proof import SecondProof, proving
 from sniff.bus.second_protocol import with_foreign
-from sniff.engine.bulk import tables
+from sniff.engine.bulk import tables_of
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session, with_settings
@@ -120,7 +120,7 @@ class DataCapture:
     def _tables(self, proof: SecondProof | None = None) -> Iterator[Table]:
         """All that can be read; a warning where that is not all. `proof`: sees each before it is given."""
         try:
-            for item in proving(tables(self._capture.blocks(), self.session), proof):
+            for item in proving(tables_of(self._capture, self.session), proof):
                 if isinstance(item, Table):
                     yield item
         except CaptureError as error:

@@ -17,8 +17,8 @@ from dissectors.profiles import Devices
 from sniff.analysis.point_reader import MOST_OPEN, PointReader
 from sniff.analysis.table_points import samples_of
 from sniff.analysis.wording import describe
-from sniff.bus.offline import ReadSource, survey
-from sniff.engine.capture import CaptureError
+from sniff.bus.offline import survey
+from sniff.engine.capture import CaptureError, ReadSource
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import Observer

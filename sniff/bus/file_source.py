@@ -26,7 +26,7 @@ from sniff.bus.rows import Store
 from sniff.bus.second_protocol import ForeignFrames
 from sniff.engine.blocks import in_pieces
 from sniff.engine.bulk import tables
-from sniff.engine.capture import Capture, CaptureError
+from sniff.engine.capture import Capture, CaptureError, KeepsTables
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.packed_table import PackedTable
 from sniff.engine.session import LineEvent, Session
@@ -170,7 +170,7 @@ class FileFeed:
         """All that is in the file; last why it ends, None where all is well."""
         try:
             before: PackedTable | None = None
-            for item in tables(in_pieces(self.capture.blocks(), FIRST_READS, READS), session):
+            for item in self._tables(session):
                 if isinstance(item, LineEvent):
                     yield item
                     continue
@@ -188,6 +188,18 @@ class FileFeed:
             yield None if complete.whole else CaptureError(complete.text)
         except Exception as error:  # of the thread: whoever polls raises it
             yield error
+
+    def _tables(self, session: Session) -> Iterator[Table | LineEvent]:
+        held = self.capture.stored_tables(session) if isinstance(self.capture, KeepsTables) else None
+        if held is None:
+            yield from tables(in_pieces(self.capture.blocks(), FIRST_READS, READS), session)
+            return
+        for item in held:
+            if isinstance(item, LineEvent):
+                yield item
+            else:
+                for begin in range(0, max(1, len(item)), READS):
+                    yield item.part(begin, min(begin + READS, len(item)))
 
     def _see(self) -> None:
         """Look for a second protocol; of a thread, for all protocols have to be imported when it is asked for."""

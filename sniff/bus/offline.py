@@ -7,7 +7,7 @@ from contextlib import closing
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from dissectors.profiles import Devices
-from sniff.engine.capture import CaptureError
+from sniff.engine.capture import CaptureError, ReadSource
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import SessionEngine, dissector_for
 from sniff.engine.observer import Observer, observe, observe_tables
@@ -17,7 +17,6 @@ from sniff.engine.verdict_join import JudgedRow, VerdictJoin, Wanted
 if TYPE_CHECKING:
     from sniff.analysis.point_reader import PointReader
     from sniff.bus.second_proof import SecondProof
-    from sniff.engine.blocks import Block
     from sniff.engine.column_join import SettledRows
     from sniff.engine.table import Table
 
@@ -41,18 +40,6 @@ def outputs(items: Iterable[Item], session: Session) -> Iterator[Output | LineEv
     yield engine.close()
 
 
-class ReadSource(Protocol):
-    """Reads, one by one and in blocks."""
-
-    def items(self) -> Iterator[Item]:
-        """See `engine.capture.Capture`."""
-        ...
-
-    def blocks(self) -> Iterator[Block | LineEvent]:
-        """See `engine.capture.Capture`."""
-        ...
-
-
 def survey(capture: ReadSource, session: Session, *observers: Observer, reference: bool = False) -> None:
     """Hand a whole capture to observers, many rows at a time where they take them so. `reference`: one by one, for
     comparison; the same comes of it. Raises CaptureError as the capture does, when all before the damage was handed
@@ -61,9 +48,9 @@ def survey(capture: ReadSource, session: Session, *observers: Observer, referenc
         observe(outputs(capture.items(), session), *observers)
         return
     from sniff.bus import two_processes
-    from sniff.engine.bulk import tables
+    from sniff.engine.bulk import tables_of
 
-    items = tables(capture.blocks(), session)
+    items = tables_of(capture, session)
     if not two_processes.divides(session, observers):
         observe_tables(items, *observers)
         return
@@ -163,10 +150,10 @@ def _joined(
 ) -> Iterator[Given]:
     """What a join gives of all tables of a capture; raises what the capture does, when all before it was given."""
     from sniff.bus.second_proof import proving
-    from sniff.engine.bulk import tables
+    from sniff.engine.bulk import tables_of
 
     try:
-        for item in proving(tables(capture.blocks(), session), proof):
+        for item in proving(tables_of(capture, session), proof):
             if not isinstance(item, LineEvent):
                 yield from joining.add(item)
     except CaptureError:

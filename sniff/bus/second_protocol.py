@@ -19,10 +19,10 @@ from dissectors import registry
 from dissectors.frame import Chunk, Frame, Noise, Place, Reason
 from dissectors.line import NS_PER_S, Timing
 from dissectors.manifest import Dissector
-from sniff.bus.offline import ReadSource, outputs
+from sniff.bus.offline import outputs
 from sniff.bus.second_proof import Proving, SecondProof, is_left, left_places
-from sniff.engine.bulk import tables
-from sniff.engine.capture import CaptureError
+from sniff.engine.bulk import tables_of
+from sniff.engine.capture import CaptureError, ReadSource
 from sniff.engine.engine import Engine, Output, Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent, Session
@@ -174,7 +174,7 @@ def _left_rows(item: Output | Table) -> Iterable[Row]:
 def proven(capture: ReadSource, session: Session, reference: bool = False) -> SecondProof:
     """Whether a whole capture has a second protocol; for those who must know before any row is shown."""
     proof = SecondProof(session)
-    given = outputs(capture.items(), session) if reference else tables(capture.blocks(), session)
+    given = outputs(capture.items(), session) if reference else tables_of(capture, session)
     try:
         for item in given:
             proof.see(item)

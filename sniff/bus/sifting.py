@@ -7,11 +7,12 @@ is wrong reads the whole, and shows the findings whose evidence is accepted.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from dissectors.findings import Finding
 from dissectors.frame import Chunk
-from sniff.bus.offline import ReadSource, settled_columns
+from sniff.bus.offline import settled_columns
+from sniff.engine.capture import KeepsTables, ReadSource
 from sniff.engine.engine import Output, Row
 from sniff.engine.observer import Observer
 from sniff.engine.session import Item, LineEvent, Session
@@ -21,6 +22,9 @@ from sniff.filter.choosing import chosen
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
     from sniff.engine.column_join import SettledRows
+    from sniff.engine.table import Table
+
+Given = TypeVar("Given")
 
 
 class _Events:
@@ -32,14 +36,19 @@ class _Events:
 
     def items(self) -> Iterator[Item]:
         """As the capture."""
-        for item in self._capture.items():
-            if isinstance(item, LineEvent):
-                self.passed.append(item)
-            yield item
+        return self._noting(self._capture.items())
 
     def blocks(self) -> Iterator[Block | LineEvent]:
         """As the capture."""
-        for item in self._capture.blocks():
+        return self._noting(self._capture.blocks())
+
+    def stored_tables(self, session: Session) -> Iterator[Table | LineEvent] | None:
+        """As the capture."""
+        held = self._capture.stored_tables(session) if isinstance(self._capture, KeepsTables) else None
+        return None if held is None else self._noting(held)
+
+    def _noting(self, items: Iterator[Given]) -> Iterator[Given]:
+        for item in items:
             if isinstance(item, LineEvent):
                 self.passed.append(item)
             yield item

@@ -12,10 +12,10 @@ from dissectors import registry
 from dissectors.findings import Finding
 from dissectors.profiles import Devices
 from sniff.analysis.sanitizing import sanitized
-from sniff.bus.offline import ReadSource, survey
+from sniff.bus.offline import survey
 from sniff.cli import USAGE, Failure, arguments
 from sniff.cli.progress import Watched
-from sniff.engine.capture import Capture, CaptureError
+from sniff.engine.capture import Capture, CaptureError, ReadSource
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import Observer
 from sniff.engine.session import SECOND_NOTE, Session

@@ -127,7 +127,7 @@ def _samples(args: argparse.Namespace, capture: Capture, session: Session, devic
     """All samples, many at a time."""
     from sniff.analysis.point_columns import TableSamples, no_samples
     from sniff.analysis.table_points import samples_of
-    from sniff.engine.bulk import tables as tables_of
+    from sniff.engine.bulk import tables_of
 
     reader = PointReader(dissector_for(session), devices)
     watched = Watched(capture, prints=True)
@@ -141,7 +141,7 @@ def _samples(args: argparse.Namespace, capture: Capture, session: Session, devic
             if isinstance(output, Output):
                 yield TableSamples(no_samples(), [(0, sample) for sample in reader.add(output)])
         return
-    for table in tables_of(watched.blocks(), session):
+    for table in tables_of(watched, session):
         if not isinstance(table, LineEvent):
             yield samples_of(reader, table)
 

@@ -10,10 +10,11 @@ from sniff.analysis.poll import Poll
 from sniff.analysis.poll_words import asked, changes, told
 from sniff.analysis.polls import Polls
 from sniff.analysis.wording import station_word
-from sniff.bus.offline import ReadSource, survey
+from sniff.bus.offline import survey
 from sniff.bus.row_words import iso
 from sniff.cli import arguments, tables
 from sniff.cli.tables import Cell
+from sniff.engine.capture import ReadSource
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 

@@ -7,11 +7,12 @@ import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, TextIO, TypeVar
 
-from sniff.bus.offline import ReadSource
-from sniff.engine.session import Item, LineEvent
+from sniff.engine.capture import KeepsTables, ReadSource
+from sniff.engine.session import Item, LineEvent, Session
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
+    from sniff.engine.table import Table
 
 AFTER, EVERY = 0.5, 0.2
 """Seconds until it is first said, and again."""
@@ -49,6 +50,13 @@ class Watched:
         return self._told(
             self._capture.blocks(), lambda block: 0 if isinstance(block, LineEvent) else len(block.reads.octets)
         )
+
+    def stored_tables(self, session: Session) -> Iterator[Table | LineEvent] | None:
+        """What the capture holds."""
+        held = self._capture.stored_tables(session) if isinstance(self._capture, KeepsTables) else None
+        if held is None:
+            return None
+        return self._told(held, lambda table: 0 if isinstance(table, LineEvent) else len(table.octets))
 
     def _told(self, parts: Iterator[Read], octets_of: Callable[[Read], int]) -> Iterator[Read]:
         if not self._stream.isatty():

@@ -6,9 +6,10 @@ import argparse
 from typing import Any
 
 from dissectors.token_ring import StationTable, TokenRing
-from sniff.bus.offline import ReadSource, survey
+from sniff.bus.offline import survey
 from sniff.bus.watched_ring import WatchedRing
 from sniff.cli import tables
+from sniff.engine.capture import ReadSource
 from sniff.engine.session import Session
 
 

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING
 from dissectors.frame import Chunk
 from dissectors.profiles import Devices
 from sniff.analysis.sanitizing import sanitized
-from sniff.bus.offline import ReadSource
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.cli.progress import Watched
-from sniff.engine.capture import BlockWriter, Capture, CaptureError, CaptureWriter
+from sniff.engine.capture import BlockWriter, Capture, CaptureError, CaptureWriter, ReadSource
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for, engine_for
 from sniff.engine.session import Item, LineEvent, Session
@@ -211,42 +210,40 @@ def _is_recording(writer: object) -> bool:
 class _Frames:
     """Writes what the engine finds to /frames."""
 
-    AT_ONCE = 1000
-
     def __init__(self, writer: object, session: Session) -> None:
-        from sniff.recording.frames import SCHEMA, FrameLog
+        from sniff.recording.frame_log import FrameLog
         from sniff.recording.mcap_writer import McapWriter
-        from sniff.recording.topics import FRAMES
 
         assert isinstance(writer, McapWriter)
         self._writer = writer
-        self._log = FrameLog()
-        self._topic, self._schema = FRAMES, SCHEMA.name
-        self._octets = self._count = 0
+        self._log = FrameLog(session)
 
     def add(self, output: Output) -> None:
         self._log.add(output)
-        self._count += len(output.rows)
-        if self._count >= self.AT_ONCE:
-            self.close()
+        self._put()
 
     def add_table(self, table: Table) -> None:
-        from sniff.recording.frame_columns import messages
-
-        for message in messages(table, self._octets):
-            self._put(message)
-        self._octets += len(table.octets)
+        self._log.add_table(table)
+        self._put()
 
     def add_line_event(self, event: LineEvent) -> None:
-        """Nothing of it is kept here."""
+        self._log.add_line_event(event)
+        self._put()
 
     def close(self) -> None:
-        self._count = 0
-        self._put(self._log.take())
+        self._log.close()
+        self._put()
+        if (record := self._log.record()) is not None:
+            from sniff.recording.topics import FRAMES_RECORD
 
-    def _put(self, message: tuple[int, int, bytes] | None) -> None:
-        if message is not None:
-            self._writer.derived(self._topic, self._schema, *message)
+            self._writer.note(FRAMES_RECORD, record)
+
+    def _put(self) -> None:
+        made = self._log.take()
+        if made:
+            from sniff.recording.frames import SCHEMA
+
+            self._writer.add_frames(made, SCHEMA)
 
 
 class _Topics:

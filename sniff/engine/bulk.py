@@ -18,7 +18,7 @@ from dissectors.line import Timing
 from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction
 from sniff.engine.blocks import Block
-from sniff.engine.capture import CaptureError
+from sniff.engine.capture import CaptureError, KeepsTables, ReadSource
 from sniff.engine.engine import Engine, Output, Row
 from sniff.engine.follow_settings import SessionEngine
 from sniff.engine.framing import BulkFraming, Clean, Stretch
@@ -51,6 +51,13 @@ def tables(blocks: Iterable[Block | LineEvent], session: Session) -> Iterator[Ta
         yield engine.close()
         raise
     yield engine.close()
+
+
+def tables_of(capture: ReadSource, session: Session) -> Iterator[Table | LineEvent]:
+    """The tables of a capture: those that it holds, where they are what would be found, else found anew. Raises as
+    `tables` does."""
+    held = capture.stored_tables(session) if isinstance(capture, KeepsTables) else None
+    yield from tables(capture.blocks(), session) if held is None else held
 
 
 class BulkEngine:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ from sniff.recording.batcher import Batcher
 from sniff.recording.block_batches import add_block
 from sniff.recording.part import PartFile
 from sniff.recording.topic_message import Message, stamp
-from sniff.recording.topics import LINE, RAW
+from sniff.recording.topics import FRAMES, LINE, RAW, SchemaText
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
@@ -68,7 +68,22 @@ class McapWriter:
             return
         sequence = self._sequences.get(topic, 0)
         self._sequences[topic] = (sequence + 1) % (1 << 32)
-        self._part.add(Message(topic, stamp(log_time), stamp(publish_time), sequence, data), schema_name, metadata)
+        self._part.hold(Message(topic, stamp(log_time), stamp(publish_time), sequence, data), schema_name, metadata)
+        if self._part.holds_enough:
+            self._part.release()
+
+    def add_frames(self, messages: Iterable[tuple[int, int, bytes]], schema: SchemaText) -> None:
+        """Add messages of /frames (log time, publish time, data), each in a chunk of its own. Raises CaptureError."""
+        self._part.define(schema)
+        for log_time, publish_time, data in messages:
+            sequence = self._sequences[FRAMES] = self._sequences.get(FRAMES, -1) + 1
+            self._part.hold(Message(FRAMES, stamp(log_time), stamp(publish_time), sequence, data), schema.name)
+            self._part.release()
+            self._add([])
+
+    def note(self, name: str, words: Mapping[str, str]) -> None:
+        """Add a metadata record."""
+        self._part.note(name, words)
 
     def write(self, item: Item, bus: int = 0) -> None:
         """Add a chunk or line event. Raises CaptureError."""

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 from sniff.engine.session import Session
-from sniff.recording import frames
 from sniff.recording.chunk_indices import ChunkIndices
 from sniff.recording.topic_message import Message
 from sniff.recording.topics import (
@@ -27,6 +26,7 @@ from sniff.recording.topics import (
     SCHEMAS,
     SESSION_RECORD,
     VERSION,
+    SchemaText,
     topics_of,
 )
 from sniff.version import __version__
@@ -37,7 +37,6 @@ HELD_SIZE = 1 << 17
 """Octets of results that are kept back at most."""
 
 _WRITTEN_AT_ONCE = 1 << 18
-_KNOWN = {**SCHEMAS, frames.SCHEMA.name: frames.SCHEMA}
 
 
 class _Pending:
@@ -84,6 +83,7 @@ class PartFile:
         self._held_size = 0
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
+        self._known = dict(SCHEMAS)
         self._writer.start(PROFILE, f"sniff485 {__version__}")
         for session in sessions:
             self._writer.add_metadata(SESSION_RECORD, session.to_metadata())
@@ -102,6 +102,15 @@ class PartFile:
         started = sessions[0].started
         for name, document in documents.items():
             self._writer.add_attachment(started, started, name + PROFILE_SUFFIX, PROFILE_MEDIA_TYPE, document.encode())
+
+    def define(self, schema: SchemaText) -> None:
+        """A schema that messages may name, beside those that all recordings have."""
+        self._known[schema.name] = schema
+
+    def note(self, name: str, words: Mapping[str, str]) -> None:
+        """Add a metadata record. Writes nothing out."""
+        self.release()
+        self._writer.add_metadata(name, dict(words))
 
     @property
     def size(self) -> int:
@@ -166,7 +175,7 @@ class PartFile:
             self._pending.written += done
 
     def _register(self, topic: str, name: str, metadata: dict[str, str]) -> int:
-        schema = _KNOWN.get(name)
+        schema = self._known.get(name)
         if schema is None:
             channel: int = self._writer.register_channel(topic, "json", 0, metadata)
         else:

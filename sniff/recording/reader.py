@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
-from typing import BinaryIO, cast
+from typing import TYPE_CHECKING, BinaryIO, cast
 
 import numpy as np
 
@@ -28,13 +29,11 @@ from sniff.recording import scan
 from sniff.recording.batch import Batch
 from sniff.recording.batch_run import BatchRun, run_of
 from sniff.recording.clean_batches import CleanBatches
-from sniff.recording.frames import METADATA, SCHEMA, FrameBatch
 from sniff.recording.joiner import Joiner
 from sniff.recording.line_messages import line_event
 from sniff.recording.messages import Head, MessagePass
 from sniff.recording.topics import (
     BUS,
-    FRAMES,
     PART_RECORD,
     PROFILE,
     PROFILE_MEDIA_TYPE,
@@ -44,6 +43,9 @@ from sniff.recording.topics import (
     VERSION,
     topics_of,
 )
+
+if TYPE_CHECKING:
+    from sniff.engine.table import Table
 
 FAR = (1 << 63) - 1
 """ns; after everything."""
@@ -82,8 +84,8 @@ class McapCapture:
         self.octets_before = 0
         self._known_first = False
         self._completeness: Completeness | None = None
-        self._holes = False
         self._index = scan.ChunkIndex()
+        self._only: Container[int] | None = None
         try:
             self._read_start()
             own = topics_of([session.bus for session in self.sessions] or [""])
@@ -145,7 +147,7 @@ class McapCapture:
     def _joined(self, joiner: Joiner, since: int | None, columns: bool, *, alone: bool) -> Iterator[Item | Reads]:
         """What this file gives to a joiner; `alone`: which has seen no other file, so that it says what is missing."""
         clean = CleanBatches()
-        with self._pass(since) as one:
+        with self.reading(since) as one:
             try:
                 for piece in self._runs_of(one, joiner, columns and since is None):
                     if isinstance(piece, BatchRun):
@@ -181,14 +183,14 @@ class McapCapture:
         if self._completeness is not None:
             return self._completeness
         joiner = self._joiner(None)
-        with self._pass() as one:
+        with self.reading() as one:
             for head, batch in self.batches_of(one, joiner):
                 joiner.skip(head[1], batch)
             return self._note(one, joiner)
 
     def chunk_index(self) -> scan.ChunkIndex:
         """Where the chunks of the file are; none of them is read. Raises CaptureError."""
-        with self._pass(FAR) as one:
+        with self.reading(FAR) as one:
             for _ in one.messages():
                 pass
             self._index = one.report.chunks
@@ -196,33 +198,34 @@ class McapCapture:
 
     # what else is in the file
 
+    def only(self, chunks: Container[int]) -> McapCapture:
+        """The same, read from the chunks that begin at these octets of the file; the others hold nothing of it."""
+        other = copy(self)
+        other._only = chunks
+        return other
+
+    def know_from(self, other: McapCapture) -> None:
+        """Take over what reading another one of the same file has found out."""
+        self._completeness = other._completeness
+
     def batches(self, since: int | None = None) -> Iterator[Batch]:
         """The batches of /raw as they are, for work on columns; those that end before `since` (ns) left out."""
-        with self._pass(since) as one:
+        with self.reading(since) as one:
             for topic, head, data in one.messages():
                 if topic == self._raw_topic and (since is None or head[2] >= since):
                     batch = one.batch(head, data)
                     if batch is not None:
                         yield batch
 
-    def frames(self) -> Iterator[FrameBatch]:
-        """What the engine found when this was recorded: nothing when another version of the program wrote it, or
-        when the recording has a hole, since the places of octets are not known then. Best effort: the last
-        messages, or some between, may be missing; the numbers of the rows show it.
-        """
-        self.completeness()
-        if self._holes:
-            return
-        with self._pass() as one:
-            for topic, head, data in one.messages():
-                if topic == FRAMES and one.channels[head[0]].same(SCHEMA, METADATA):
-                    batch = FrameBatch.decode(data)
-                    if batch is not None:
-                        yield batch
+    def stored_tables(self, session: Session) -> Iterator[Table | LineEvent] | None:
+        """What the engine would give with this session, where the file holds it. Raises CaptureError."""
+        from sniff.recording.stored_tables import stored_tables  # most files hold none
+
+        return stored_tables(self, session)
 
     def messages(self, prefix: str = "/") -> Iterator[tuple[str, int, bytes]]:
         """Topic, log time (ns) and data of all messages whose topic begins so, as they are in the file."""
-        with self._pass() as one:
+        with self.reading() as one:
             for topic, head, data in one.messages():
                 if topic.startswith(prefix):
                     yield topic, head[2], data
@@ -257,12 +260,14 @@ class McapCapture:
                 yield from self._batches_in(held, one, joiner)
 
     @contextmanager
-    def _pass(self, since: int | None = None) -> Iterator[MessagePass]:
+    def reading(self, since: int | None = None) -> Iterator[MessagePass]:
         """The messages of the file. Raises CaptureError."""
         with open_capture(self.path) as stream:
             try:
                 start = None if since is None else self._index.find(since)
-                yield MessagePass(stream, scan.Report(os.fstat(stream.fileno()).st_size), since, start, self._known)
+                yield MessagePass(
+                    stream, scan.Report(os.fstat(stream.fileno()).st_size), since, start, self._known, self._only
+                )
             except OSError as error:
                 raise explain(self.path, error) from None
 
@@ -282,7 +287,6 @@ class McapCapture:
         """Keep what a whole pass found, and where the chunks are, for later jumps."""
         self._index = one.report.chunks
         self._completeness = _judge(one, joiner)
-        self._holes = bool(joiner.missing or joiner.backward)
         return self._completeness
 
     # the start

@@ -14,7 +14,7 @@ import struct
 import zlib
 from array import array
 from bisect import bisect_left
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 from typing import BinaryIO, TypeVar
@@ -37,6 +37,8 @@ _CHUNK_START = _CHUNK.size + 32  # octets that hold all of a chunk's sizes, its 
 _ZSTD = b"\x04\x00\x00\x00zstd"
 _ZSTD_AT = _RECORD.size + 28  # of that in a chunk record
 _BLOCK = 1 << 20
+ALWAYS = 1 << 64
+"""ns; after every chunk."""
 
 
 class ChunkIndex:
@@ -69,6 +71,7 @@ class Report:
     size: int
     end: int = 0
     footer: bool = False
+    checked: bool = False  # against the check over the whole file, which agrees
     problems: list[str] = field(default_factory=list)  # in words, the first of them
     places: int = 0  # how many there are
     skipped: int = 0  # octets before `end` that could not be read
@@ -91,11 +94,17 @@ class Record:
     body: bytes | None
 
 
-def records(stream: BinaryIO, report: Report, since: int | None = None, start: int | None = None) -> Iterator[Record]:
+def records(
+    stream: BinaryIO,
+    report: Report,
+    since: int | None = None,
+    start: int | None = None,
+    only: Container[int] | None = None,
+) -> Iterator[Record]:
     """The records of a file, from its beginning or from a chunk at `start`.
 
     `since`: chunks whose messages all are earlier (ns) are passed over without being read; the check over the whole
-    file is then not made.
+    file is then not made. `only`: the same for chunks that do not begin at one of these octets.
     """
     position = len(MAGIC) if start is None else start
     stream.seek(position)
@@ -125,7 +134,8 @@ def records(stream: BinaryIO, report: Report, since: int | None = None, start: i
             report.end = position
             _end_of_data(stream, length, check if whole else None, report)
             return
-        body, last_time = _body(stream, opcode, length, since)
+        skipped = only is not None and opcode == CHUNK and position not in only
+        body, last_time = _body(stream, opcode, length, ALWAYS if skipped else since)
         whole = whole and body is not None
         if whole and body is not None:
             check = zlib.crc32(body, zlib.crc32(head, check))
@@ -162,6 +172,8 @@ def _end_of_data(stream: BinaryIO, length: int, check: int | None, report: Repor
         report.problem("the index at the end is damaged")
     elif check is not None and told not in (bytes(4), struct.pack("<I", check)):
         report.problem("the check over the whole file fails: some octet has changed")
+    else:
+        report.checked = check is not None and told != bytes(4)
     _summary(stream, report)
 
 

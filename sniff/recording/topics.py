@@ -25,6 +25,9 @@ SESSION_RECORD = "session"
 PART_RECORD = "recording"
 """Metadata record with the version of the layout, the part's number and what came before it."""
 
+FRAMES_RECORD = "frames"
+"""Metadata record behind all chunks: who made the /frames, and of what."""
+
 PROFILE_SUFFIX = ".toml"
 PROFILE_MEDIA_TYPE = "application/toml"
 """Of the attachments that hold the device profiles in force, "teco-e510.toml" and so on, in every part."""

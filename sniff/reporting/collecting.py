@@ -20,9 +20,9 @@ from sniff.analysis.summary import Summary, ranked
 from sniff.analysis.trends import Trend, Trends
 from sniff.analysis.wording import describe
 from sniff.bus.model import BusModel
-from sniff.bus.offline import ReadSource, outputs, survey
+from sniff.bus.offline import outputs, survey
 from sniff.bus.sifting import shown_findings, sift
-from sniff.engine.capture import Capture
+from sniff.engine.capture import Capture, ReadSource
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import DEVICES_NOTE, LineEvent, Session
@@ -227,9 +227,9 @@ def _rows(capture: ReadSource, session: Session, wanted: set[int], reference: bo
             if rows and rows[-1].no >= last:
                 return
         return
-    from sniff.engine.bulk import tables
+    from sniff.engine.bulk import tables_of
 
-    for table in tables(capture.blocks(), session):
+    for table in tables_of(capture, session):
         if not isinstance(table, LineEvent):
             yield from (table.row(no - table.first) for no in sorted(wanted) if 0 <= no - table.first < len(table))
             if table.first + len(table) > last:

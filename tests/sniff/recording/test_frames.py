@@ -1,171 +1,193 @@
-"""The /frames topic: what was encoded comes back, another version's is not used, damage never crashes."""
+"""Messages of /frames: what was encoded comes back, and damage gives nothing, or a table that can be read."""
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dissectors.frame import Check, Chunk, Damage, FoundBy, Frame, Header, LineError, Mark, Noise, Place, Reason, Role
+from dissectors.frame import (
+    Assembly,
+    Check,
+    Damage,
+    Flaw,
+    FoundBy,
+    Frame,
+    Header,
+    LineError,
+    Mark,
+    Noise,
+    Place,
+    Reason,
+    Repair,
+    Role,
+)
 from dissectors.line import LineSettings
 from dissectors.tracker import Interval, Placement, Transaction, Verdict
-from sniff.engine.engine import Output, Row
-from sniff.engine.session import Session
-from sniff.recording import frames
-from sniff.recording.frames import FrameBatch, FrameLog, encode
-from sniff.recording.reader import McapCapture, read
-from sniff.recording.topics import FRAMES
-from sniff.recording.writer import Recorder
+from sniff.engine.bulk import tables
+from sniff.engine.engine import Row
+from sniff.engine.table import Table
+from sniff.formats import read
+from sniff.recording.frames import StoredTable, encode
 from tests.seeds import examples
 
-I64 = st.integers(-(2**63) + 1, 2**63 - 1)
+CAPTURES = Path(__file__).parents[3] / "captures"
+
+TIME = st.integers(-(1 << 62) + 1, (1 << 62) - 1)
 OCTETS = st.binary(max_size=20)
 MARKS = st.lists(st.builds(Mark, st.integers(0, 2**32 - 1), st.integers(1, 15).map(LineError)), max_size=2).map(tuple)
-WORD = st.text("abc-Ä ", min_size=1, max_size=5)
-FLAG = st.text("abc-", min_size=1, max_size=5)
+WORD = st.text("abc-Ä\0 ", min_size=1, max_size=5)
 ADDRESS = st.none() | st.integers(0, 255)
-MAYBE = st.none() | I64
+MAYBE = st.none() | st.integers(0, 2**31 - 1)
+SMALL = st.integers(0, 2**31 - 1)
+NUMBERS = st.lists(SMALL, max_size=3).map(tuple)
 
 FRAME = st.builds(
     Frame,
-    WORD,
+    st.just("n2"),
     OCTETS,
-    I64,
-    I64,
+    TIME,
+    TIME,
     st.sampled_from(Check),
     st.sampled_from(FoundBy),
     st.none() | st.sampled_from(Damage),
-    st.none() | st.integers(0, 2**31 - 1),
-    st.integers(0, 2**32 - 1),
-    I64,
-    MARKS,
-    st.lists(FLAG, max_size=2).map(tuple),
+    MAYBE,
+    st.just(0) | SMALL,
+    TIME,
+    st.just(()) | MARKS,
+    st.just(()) | st.lists(WORD, max_size=2).map(tuple),
+    st.none() | st.builds(Repair, st.sampled_from(Flaw), OCTETS),
+    st.none() | st.builds(Assembly, OCTETS, NUMBERS, NUMBERS),
 )
-NOISE = st.builds(Noise, OCTETS, I64, I64, st.sampled_from(Place), st.sampled_from(Reason), MARKS)
-
-
-@st.composite
-def rows(draw: st.DrawFn) -> Row:
-    no = draw(st.integers(1, 2**63))
-    event = draw(FRAME | NOISE)
-    if isinstance(event, Noise):
-        return Row(no, event)
-    header = Header(
-        event.protocol,
-        draw(ADDRESS),
-        draw(ADDRESS),
-        draw(st.sampled_from(Role)),
-        draw(WORD),
-        draw(ADDRESS),
-        draw(MAYBE),
-        draw(MAYBE),
-        draw(st.booleans()),
-        draw(st.none() | WORD),
-    )
-    placement = None
-    if draw(st.booleans()):
-        tx = draw(st.integers(1, 2**63))
-        placement = Placement(no, tx, draw(st.sampled_from(Role)), draw(ADDRESS), draw(ADDRESS))
-    return Row(no, event, header, placement)
-
-
-TRANSACTION = st.builds(
-    Transaction,
-    st.integers(1, 2**63),
+NOISE = st.builds(Noise, OCTETS, TIME, TIME, st.sampled_from(Place), st.sampled_from(Reason), MARKS)
+HEADER = st.builds(
+    Header,
+    st.just("n2"),
     ADDRESS,
+    ADDRESS,
+    st.sampled_from(Role),
     WORD,
+    ADDRESS,
+    st.none() | st.integers(0, 2**40),  # a plug-in may give anything
     MAYBE,
-    MAYBE,
-    st.sampled_from(Verdict),
-    I64,
-    I64,
-    st.none() | st.builds(Interval, I64, I64, I64),
-    st.integers(1, 2**31),
-    MAYBE,
+    st.booleans(),
     st.none() | WORD,
 )
 
 
-@given(st.lists(rows(), max_size=8), st.lists(TRANSACTION, max_size=4), st.integers(0, 2**60))
-@settings(deadline=None, max_examples=50)
-def test_what_was_encoded_comes_back(some: list[Row], transactions: list[Transaction], offset: int) -> None:
-    batch = FrameBatch.decode(encode(some, transactions, offset))
-    assert batch is not None
-    octets = b"".join(row.event.octets for row in some)
-    assert list(batch.rows(octets, offset)) == some
-    assert list(batch.transaction_values()) == transactions
-    assert batch.events["no"].tolist() == [row.no for row in some]
-    before = b"".join(row.event.octets for row in some[:2])
-    assert list(batch.rows(before, offset))[:2] == some[:2]
+@st.composite
+def whole_tables(draw: st.DrawFn) -> Table:
+    first = draw(st.integers(1, 2**40))
+    rows: list[Row] = []
+    for number, event in enumerate(draw(st.lists(FRAME | NOISE, max_size=8)), first):
+        if isinstance(event, Noise):
+            rows.append(Row(number, event))
+            continue
+        placed = None
+        if draw(st.booleans()):
+            roles = st.sampled_from(Role)
+            placed = Placement(number, draw(st.integers(1, first)), draw(roles), draw(ADDRESS), draw(ADDRESS))
+        rows.append(Row(number, event, draw(HEADER), placed))
+    last = first + len(rows) - 1
+    of_row = st.none() | st.integers(0, last)
+    latency = st.none() | st.builds(Interval, st.integers(0, 2**61), st.integers(0, 2**61), st.integers(0, 2**61))
+    closed = st.builds(
+        Transaction,
+        st.integers(1, first),
+        ADDRESS,
+        WORD,
+        of_row,
+        of_row,
+        st.sampled_from(Verdict),
+        TIME,
+        TIME,
+        latency,
+        st.integers(1, 2**31 - 1),
+        st.none() | st.integers(1, first),
+        st.none() | WORD,
+    )
+    closing = draw(st.lists(closed, max_size=4))
+    by = sorted(draw(st.integers(0 if rows else -1, len(rows) - 1)) for _ in closing)
+    return Table.of("n2", first, rows, closing, by)
+
+
+def same(one: Table, other: Table) -> bool:
+    return list(one.outputs()) == list(other.outputs())
+
+
+@given(whole_tables(), st.integers(0, 2**40))
+@settings(deadline=None, max_examples=examples(100))
+def test_what_was_encoded_comes_back(table: Table, events: int) -> None:
+    stored = StoredTable.decode(encode(table, events))
+    assert stored is not None
+    assert (stored.first, stored.rows, stored.closed) == (table.first, len(table), len(table.transactions))
+    assert (stored.octets, stored.events) == (len(table.octets), events)
+    found = stored.table("n2", table.octets)
+    assert found is not None
+    assert same(found, table)
+
+
+@given(whole_tables().filter(lambda table: len(table.octets) > 0), st.data())
+@settings(deadline=None, max_examples=examples(50))
+def test_other_octets_are_not_taken(table: Table, data: st.DataObject) -> None:
+    stored = StoredTable.decode(encode(table, 0))
+    assert stored is not None
+    octets = table.octets.copy()
+    octets[data.draw(st.integers(0, len(octets) - 1))] ^= data.draw(st.integers(1, 255))
+    assert stored.table("n2", octets) is None
+    assert stored.table("n2", table.octets[1:]) is None
+
+
+@cache
+def encoded() -> tuple[tuple[bytes, Table], ...]:
+    """Tables of a noisy capture of each protocol, one a message."""
+    made: list[tuple[bytes, Table]] = []
+    for path in CAPTURES.glob("*-usual-faults.cap.txt"):
+        capture = read(path)
+        for table in tables(capture.blocks(), capture.session):
+            if isinstance(table, Table) and len(table):
+                made.append((encode(table, 0), table))
+    return tuple(made)
+
+
+def test_there_is_something_to_damage() -> None:
+    assert len({table.protocol for _, table in encoded()}) == 5
+    assert sum(len(table.odd) for _, table in encoded()) > 20
+
+
+def damaged(data: st.DataObject) -> tuple[bytes, Table]:
+    octets, table = data.draw(st.sampled_from(encoded()))
+    changed = bytearray(octets)
+    size = int.from_bytes(octets[:4], "little")
+    for _ in range(data.draw(st.integers(1, 4))):
+        where = st.integers(0, 4 + size) | st.integers(0, len(octets) - 1)  # the description, or anywhere
+        changed[data.draw(where)] = data.draw(st.integers(0, 255) | st.sampled_from(b'0159-"[],'))
+    cut = data.draw(st.just(len(octets)) | st.integers(0, len(octets)))
+    return bytes(changed[:cut]), table
 
 
 @given(st.data())
-@settings(deadline=None, max_examples=examples(150))
+@settings(deadline=None, max_examples=examples(300))
 def test_damage_never_crashes(data: st.DataObject) -> None:
-    some = [Row(1, Noise(b"ab", 1, 2, Place.AFTER, Reason.PAD, (Mark(1, LineError.BREAK),)))]
-    some.append(
-        Row(
-            2,
-            Frame("n2", b"cd", 3, 4, Check.GOOD, FoundBy.GAP, Damage.LONG, 7, flags=("odd",)),
-            Header("n2", 1, 2, Role.POLL, "poll", error="what"),
-            Placement(2, 1, Role.POLL),
-        )
-    )
-    octets = bytearray(encode(some, [Transaction(1, 2, "poll", 2, None, Verdict.OPEN, 3, 4, Interval(1, 2, 3))], 0))
-    for _ in range(data.draw(st.integers(1, 4))):
-        octets[data.draw(st.integers(0, len(octets) - 1))] = data.draw(st.integers(0, 255))
-    cut = data.draw(st.integers(0, len(octets)) | st.just(len(octets)))
-    batch = FrameBatch.decode(bytes(octets[:cut]))
-    if batch is not None:
-        for row in batch.rows(b"abcd" * 100):
-            assert isinstance(row.no, int)
-        for transaction in batch.transaction_values():
-            assert isinstance(transaction.verdict, Verdict)
+    octets, table = damaged(data)
+    stored = StoredTable.decode(octets)
+    found = None if stored is None else stored.table(table.protocol, table.octets)
+    if found is not None:
+        for output in found.outputs():
+            assert all(isinstance(row.no, int) for row in output.rows)
+        assert b"".join(row.event.octets for row in found.rows()) == table.octets.tobytes()
 
 
-def some_output(first: int) -> Output:
-    given = [
-        Row(first + n, Noise(bytes([n]) * 3, first * 10 + n, first * 10 + n + 5, Place.BEFORE, Reason.ZEROS))
-        for n in range(5)
-    ]
-    return Output(tuple(given), (Transaction(first, None, "x", None, None, Verdict.OPEN, 1, 2),))
+@pytest.mark.parametrize("row", [Row(1, Noise(b"ab", 1, 2, Place.AFTER, Reason.PAD), searched=LineSettings())])
+def test_what_a_search_heard_is_not_kept(row: Row) -> None:
+    with pytest.raises(ValueError, match="searched"):
+        encode(Table.of("n2", 1, [row], []), 0)
 
 
-def record(path: Path, metadata: dict[str, str]) -> McapCapture:
-    log = FrameLog()
-    recorder = Recorder(path, Session("p", LineSettings(), "n2"))
-    for first in (1, 6):
-        output = some_output(first)
-        for row in output.rows:
-            recorder.chunk(Chunk(row.event.start, row.event.octets))
-        log.add(output)
-        taken = log.take()
-        assert taken is not None
-        recorder.derived(FRAMES, frames.SCHEMA.name, *taken, metadata)
-    assert log.take() is None
-    recorder.close()
-    assert recorder.trouble is None
-    capture = read(path)
-    assert isinstance(capture, McapCapture)
-    return capture
-
-
-def test_frames_of_a_recording(tmp_path: Path) -> None:
-    capture = record(tmp_path / "a.mcap", frames.METADATA)
-    octets = b"".join(item.octets for item in capture.items() if isinstance(item, Chunk))
-    batches = list(capture.frames())
-    assert [row for batch in batches for row in batch.rows(octets)] == [*some_output(1).rows, *some_output(6).rows]
-    assert [one.id for batch in batches for one in batch.transaction_values()] == [1, 6]
-
-
-@pytest.mark.parametrize("metadata", [{}, {"program": "99.0"}])
-def test_frames_of_another_version_are_not_used(tmp_path: Path, metadata: dict[str, str]) -> None:
-    assert list(record(tmp_path / "a.mcap", metadata).frames()) == []
-
-
-def test_frames_beside_a_hole_are_not_used(tmp_path: Path) -> None:
-    capture = record(tmp_path / "a.mcap", frames.METADATA)
-    capture.first_chunk = -1
-    assert list(capture.frames()) == []
+def test_times_of_a_damaged_file_are_not_kept() -> None:
+    row = Row(1, Noise(b"ab", -(1 << 63), 1 << 62, Place.AFTER, Reason.PAD))
+    with pytest.raises(ValueError, match="not kept"):
+        encode(Table.of("n2", 1, [row], []), 0)

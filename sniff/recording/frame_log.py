@@ -1,0 +1,116 @@
+"""What an engine finds, on its way into the /frames of a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from sniff.engine.engine import Output
+from sniff.engine.session import LineEvent, Session, settings_change
+from sniff.engine.table import Table, joined
+from sniff.recording.frames import encode
+from sniff.recording.stored_tables import StoredRecord, is_kept, record_of
+
+AT_ONCE = 1 << 16
+"""Rows of a message, about."""
+
+GATHERED = 1000
+"""Rows that came one by one, to be one table."""
+
+
+class FrameLog:
+    """Takes what an engine gives of a capture, with the line events between; gives the messages and the record that
+    ends them.
+
+    `fits`: whether whoever reads it can take it for what an engine would find: not where settings are searched for or
+    change, where a plug-in dissects, and where a table is not kept. Nothing is given any more when that is known.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self.fits = is_kept(session)
+        self._session = session
+        self._outputs: list[Output] = []
+        self._tables: list[Table] = []
+        self._rows = 0  # of those that wait
+        self._made: list[tuple[int, int, bytes]] = []
+        self._all_rows = self._closed = self._octets = self._events = 0
+
+    def add(self, output: Output) -> None:
+        """Rows, and what closed with them."""
+        self._outputs.append(output)
+        self._rows += len(output.rows)
+        if self._rows >= GATHERED:
+            self._gather()
+
+    def add_table(self, table: Table) -> None:
+        """The same as a table."""
+        self._gather()
+        if table:
+            self._tables.append(table)
+            self._rows += len(table)
+        if self._rows >= AT_ONCE:
+            self._make()
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """What happened on the line, after the rows before it."""
+        if settings_change(event) is not None:
+            self.fits = False
+        self._gather()
+        self._make()
+        self._events += 1
+
+    def close(self) -> None:
+        """Nothing more comes."""
+        self._gather()
+        self._make()
+
+    def take(self) -> list[tuple[int, int, bytes]]:
+        """log time, publish time and data of the messages that were made since."""
+        made, self._made = self._made, []
+        return made if self.fits else []
+
+    def record(self) -> dict[str, str] | None:
+        """The record that ends them; None where they do not fit."""
+        if not self.fits:
+            return None
+        counted = StoredRecord(self._all_rows, self._closed, self._octets, self._events)
+        return record_of(self._session, counted)
+
+    def _gather(self) -> None:
+        outputs, self._outputs = self._outputs, []
+        if outputs:
+            given = sum(len(output.rows) for output in outputs)
+            self._rows -= given
+            self.add_table(Table.of_outputs(self._session.protocol, self._next(outputs), outputs))
+
+    def _next(self, outputs: Sequence[Output]) -> int:
+        first = next((row.no for output in outputs for row in output.rows), None)
+        return self._all_rows + sum(map(len, self._tables)) + 1 if first is None else first
+
+    def _make(self) -> None:
+        tables, self._tables, self._rows = self._tables, [], 0
+        if not tables or not self.fits:
+            return
+        whole = joined(self._session.protocol, tables[0].first, tables)
+        try:
+            for table in _pieces(whole):
+                self._made.append((*_span(table), encode(table, self._events)))
+                self._all_rows += len(table)
+                self._closed += len(table.transactions)
+                self._octets += int(table.frames.length.sum())
+        except ValueError:
+            self.fits = False
+
+
+def _pieces(table: Table) -> Iterator[Table]:
+    """The table in parts of about equal length, so that none holds only what was left over."""
+    count = max(1, round(len(table) / AT_ONCE))
+    for part in range(count):
+        yield table.part(len(table) * part // count, len(table) * (part + 1) // count) if count > 1 else table
+
+
+def _span(table: Table) -> tuple[int, int]:
+    """The latest end and the earliest start, of rows, else of exchanges."""
+    of = table.frames if len(table) else table.transactions
+    return int(np.max(of.end)), int(np.min(of.start))

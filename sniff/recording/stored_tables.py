@@ -1,0 +1,224 @@
+"""The tables that a recording holds on /frames, given in place of what an engine would find, where they are just that.
+
+They are taken where the record behind them says that this very program made them, for the protocol and the times that
+are asked for, and where the check over the whole file agrees: nothing was changed, lost or added since. Each table
+says which octets it was made of. What contradicts all that was made to deceive, and is an error.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import deque
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
+
+import numpy as np
+
+from dissectors import registry
+from dissectors.columns import Octets
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import LineEvent, Session
+from sniff.formats.files import explain, open_capture
+from sniff.recording import scan
+from sniff.recording.frames import SCHEMA, VERSION, StoredTable
+from sniff.recording.program import program
+from sniff.recording.topics import FRAMES, FRAMES_RECORD, LINE, RAW
+
+if TYPE_CHECKING:
+    from sniff.engine.table import Table
+    from sniff.recording.reader import McapCapture
+
+_FOOTER = struct.Struct("<BQQQI")  # opcode, length, start of the summary, of its offsets, check
+_CHUNK_INDEX, _METADATA_INDEX = 0x08, 0x0D
+
+
+@dataclass(frozen=True, slots=True)
+class StoredRecord:
+    """How much a file holds: rows, exchanges that closed, octets of the rows, events on /line."""
+
+    rows: int
+    closed: int
+    octets: int
+    events: int
+
+
+def record_of(session: Session, counted: StoredRecord) -> dict[str, str]:
+    """The record behind the /frames that this program makes for a session."""
+    counts, timing = {name: str(number) for name, number in asdict(counted).items()}, session.timing
+    return {
+        "version": str(VERSION),
+        "program": program(),
+        "protocol": session.protocol,
+        "timing": f"{timing.line} {timing.latency} {timing.is_told}",
+        **counts,
+    }
+
+
+def is_kept(session: Session) -> bool:
+    """Whether what is found with a session is kept in a file: not where settings are searched for, nor what a plug-in
+    finds, for nobody knows whether it would still find it."""
+    return not session.unknown and (session.protocol in registry.BUILT_IN or session.protocol in registry.RELATIVES)
+
+
+def stored_tables(capture: McapCapture, session: Session) -> Iterator[Table | LineEvent] | None:
+    """What `engine.bulk.tables` gives of this capture with this session; None where the file does not hold it. Raises
+    CaptureError, then and while they are taken."""
+    if not is_kept(session) or len(capture.sessions) > 1:
+        return None
+    try:
+        found = _found_in(capture.path)
+    except OSError as error:
+        raise explain(capture.path, error) from None
+    counted = None if found is None else _counted(found.record)
+    if found is None or counted is None or found.record != record_of(session, counted):
+        return None
+    return _tables(capture, session.protocol, counted, found.chunks)
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """What a file says of its /frames: the record, and where the chunks begin that hold each topic."""
+
+    record: Mapping[str, str]
+    chunks: Mapping[str, frozenset[int]]
+
+
+def _found_in(path: Path) -> _Found | None:
+    """What a file says that is as it was written; None where it says nothing, or where it is not. Raises OSError."""
+    from mcap.records import Metadata
+
+    with open_capture(path) as stream:
+        report = scan.Report(stream.seek(0, 2))
+        summary = _summary(stream, report.size)
+        name = FRAMES_RECORD.encode()
+        if not any(opcode == _METADATA_INDEX and body.endswith(name) for opcode, body in scan.inner_records(summary)):
+            return None  # most files: they need not be read to know it
+        told: Mapping[str, str] | None = None
+        for record in scan.records(stream, report):
+            if record.opcode == scan.METADATA and record.body is not None:
+                found = scan.parse(Metadata, record.body)
+                if found is not None and found.name == FRAMES_RECORD:
+                    told = found.metadata
+    if told is None or not (report.footer and report.checked) or report.places:
+        return None
+    return _Found(told, _chunks_by_topic(summary))
+
+
+def _summary(stream: BinaryIO, size: int) -> bytes:
+    """The records behind the data; nothing where there are none."""
+    at = size - _FOOTER.size - len(scan.MAGIC)
+    if at < len(scan.MAGIC):
+        return b""
+    stream.seek(at)
+    opcode, _, begin, _, _ = _FOOTER.unpack(stream.read(_FOOTER.size))
+    if opcode != scan.FOOTER or not 0 < begin <= at or at - begin > scan.MOST_RECORD:
+        return b""
+    stream.seek(begin)
+    return stream.read(at - begin)
+
+
+def _chunks_by_topic(summary: bytes) -> dict[str, frozenset[int]]:
+    from mcap.records import Channel, ChunkIndex
+
+    topics: dict[int, str] = {}
+    chunks: dict[int, list[int]] = {}
+    for opcode, body in scan.inner_records(summary):
+        if opcode == scan.CHANNEL and (channel := scan.parse(Channel, body)) is not None:
+            topics[channel.id] = channel.topic
+        elif opcode == _CHUNK_INDEX and (chunk := scan.parse(ChunkIndex, body)) is not None:
+            for number in chunk.message_index_offsets:
+                chunks.setdefault(number, []).append(chunk.chunk_start_offset)
+    return {topic: frozenset(chunks.get(number, ())) for number, topic in topics.items()}
+
+
+def _counted(told: Mapping[str, str]) -> StoredRecord | None:
+    try:
+        return StoredRecord(*(int(told[name]) for name in StoredRecord.__slots__))
+    except (KeyError, ValueError):
+        return None
+
+
+def _tables(
+    capture: McapCapture, protocol: str, counted: StoredRecord, chunks: Mapping[str, frozenset[int]]
+) -> Iterator[Table | LineEvent]:
+    bus = capture.only(chunks.get(RAW, frozenset()) | chunks.get(LINE, frozenset()))
+    wire = _Wire(bus)
+    rows = closed = events = octets = 0
+    for stored in _messages(capture.only(chunks.get(FRAMES, frozenset()))):
+        while stored is not None and events < stored.events:
+            event = wire.event()
+            if event is None:
+                break
+            events += 1
+            yield event
+        table = None
+        if stored is not None and (stored.first, stored.events) == (rows + 1, events):
+            own = wire.octets(stored.octets)
+            table = None if own is None else stored.table(protocol, own)
+        if table is None:
+            raise _strange(capture.path)
+        rows, closed, octets = rows + len(table), closed + len(table.transactions), octets + len(table.octets)
+        yield table
+    while (event := wire.event()) is not None:
+        events += 1
+        yield event
+    if StoredRecord(rows, closed, octets, events) != counted or wire.left:
+        raise _strange(capture.path)
+    capture.know_from(bus)
+
+
+def _messages(capture: McapCapture) -> Iterator[StoredTable | None]:
+    with capture.reading() as one:
+        for topic, head, data in one.messages():
+            if topic == FRAMES and one.channels[head[0]].same(SCHEMA, {}):
+                yield StoredTable.decode(data)
+
+
+def _strange(path: Path) -> CaptureError:
+    return CaptureError(
+        f"{path}: what it holds on {FRAMES} is not what this program wrote; --reference reads the octets alone"
+    )
+
+
+class _Wire:
+    """The octets of a capture and what happened on its line, each in its order. `left`: octets that wait."""
+
+    def __init__(self, capture: McapCapture) -> None:
+        self._blocks = capture.blocks()
+        self._events: deque[LineEvent] = deque()
+        self._octets: deque[Octets] = deque()
+        self.left = 0
+
+    def event(self) -> LineEvent | None:
+        """The next event; None where there is none."""
+        while not self._events and self._read():
+            pass
+        return self._events.popleft() if self._events else None
+
+    def octets(self, count: int) -> Octets | None:
+        """The next octets; None where there are not as many."""
+        while self.left < count and self._read():
+            pass
+        if self.left < count:
+            return None
+        parts: list[Octets] = []
+        wanted = count
+        while wanted:
+            part = self._octets.popleft()
+            parts.append(part[:wanted])
+            if len(part) > wanted:
+                self._octets.appendleft(part[wanted:])
+            wanted -= len(parts[-1])
+        self.left -= count
+        return parts[0] if len(parts) == 1 else np.concatenate(parts) if parts else np.zeros(0, np.uint8)
+
+    def _read(self) -> bool:
+        item = next(self._blocks, None)
+        if isinstance(item, LineEvent):
+            self._events.append(item)
+        elif item is not None and len(item.reads.octets):
+            self._octets.append(item.reads.octets)
+            self.left += len(item.reads.octets)
+        return item is not None
