@@ -18,10 +18,11 @@ from sniff.analysis.point_reader import MOST_OPEN, PointReader
 from sniff.analysis.table_points import samples_of
 from sniff.analysis.wording import describe
 from sniff.bus.offline import survey
-from sniff.engine.capture import CaptureError, ReadSource
+from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import Observer
+from sniff.engine.read_source import ReadSource
 from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table
 from sniff.filter.scope import ToldPoint

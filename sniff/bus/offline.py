@@ -7,10 +7,11 @@ from contextlib import closing
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from dissectors.profiles import Devices
-from sniff.engine.capture import CaptureError, ReadSource
+from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import SessionEngine, dissector_for
 from sniff.engine.observer import Observer, observe, observe_tables
+from sniff.engine.read_source import ReadSource
 from sniff.engine.session import Item, LineEvent, Session
 from sniff.engine.verdict_join import JudgedRow, VerdictJoin, Wanted
 

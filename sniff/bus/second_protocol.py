@@ -22,9 +22,10 @@ from dissectors.manifest import Dissector
 from sniff.bus.offline import outputs
 from sniff.bus.second_proof import Proving, SecondProof, is_left, left_places
 from sniff.engine.bulk import tables_of
-from sniff.engine.capture import CaptureError, ReadSource
+from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Engine, Output, Row
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.read_source import ReadSource
 from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table, rows_at
 from sniff.engine.verdict_join import JudgedRow, Wanted

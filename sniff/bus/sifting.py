@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, TypeVar
 from dissectors.findings import Finding
 from dissectors.frame import Chunk
 from sniff.bus.offline import settled_columns
-from sniff.engine.capture import KeepsTables, ReadSource
 from sniff.engine.engine import Output, Row
 from sniff.engine.observer import Observer
+from sniff.engine.read_source import KeepsTables, ReadSource
 from sniff.engine.session import Item, LineEvent, Session
 from sniff.filter import Filter
 from sniff.filter.choosing import chosen

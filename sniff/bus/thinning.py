@@ -55,20 +55,29 @@ class Budget:
         self._last: dict[str, int] = {}
 
     def take(self, channel: str, now: int) -> bool:
-        """Whether a message of a channel is to be written at `now` (ns)."""
-        self._left = self._left_at(now)
-        self._at = now if self._at is None else max(self._at, now)
-        if not self._has_turn(channel, now, self._left):
+        """Whether a message of a channel is to be written at `now` (ns). Asking for what has no turn changes nothing."""
+        left = self._left_at(now)
+        if not self._has_turn(channel, now, left):
             return False
-        self._left -= 1
+        self._left, self._at = left - 1, now if self._at is None else max(self._at, now)
         self._last[channel] = now
         return True
+
+    def settle(self, now: int, rate: float) -> None:
+        """From `now` on (ns) there is room for `rate` messages a second."""
+        if rate != self.rate:
+            self._left, self._at = self._left_at(now), now if self._at is None else max(self._at, now)
+            self.rate = rate
 
     def would_take(self, channels: Iterable[str], now: int) -> bool:
         """Whether a message of any of these channels may be written at `now` (ns). False is sure whatever is written
         until then, for that leaves less; so it may be asked ahead of time, and changes nothing."""
         left = self._left_at(now)
         return any(self._has_turn(channel, now, left) for channel in channels)
+
+    def is_spent(self, now: int) -> bool:
+        """Whether nothing at all may be written at `now` (ns); as sure as `would_take`."""
+        return self._left_at(now) < 1
 
     def _left_at(self, now: int) -> float:
         """Messages left at `now`, if none is written until then."""

@@ -15,9 +15,10 @@ from sniff.analysis.sanitizing import sanitized
 from sniff.bus.offline import survey
 from sniff.cli import USAGE, Failure, arguments
 from sniff.cli.progress import Watched
-from sniff.engine.capture import Capture, CaptureError, ReadSource
+from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import Observer
+from sniff.engine.read_source import ReadSource
 from sniff.engine.session import SECOND_NOTE, Session
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from sniff.bus.offline import survey
 from sniff.bus.row_words import iso
 from sniff.cli import arguments, tables
 from sniff.cli.tables import Cell
-from sniff.engine.capture import ReadSource
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.read_source import ReadSource
 from sniff.engine.session import Session
 
 HEADINGS = (

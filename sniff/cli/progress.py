@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, TextIO, TypeVar
 
-from sniff.engine.capture import KeepsTables, ReadSource
+from sniff.engine.read_source import KeepsTables, ReadSource
 from sniff.engine.session import Item, LineEvent, Session
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from dissectors.token_ring import StationTable, TokenRing
 from sniff.bus.offline import survey
 from sniff.bus.watched_ring import WatchedRing
 from sniff.cli import tables
-from sniff.engine.capture import ReadSource
+from sniff.engine.read_source import ReadSource
 from sniff.engine.session import Session
 
 

@@ -16,9 +16,10 @@ from dissectors.profiles import Devices
 from sniff.analysis.sanitizing import sanitized
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.cli.progress import Watched
-from sniff.engine.capture import BlockWriter, Capture, CaptureError, CaptureWriter, ReadSource
+from sniff.engine.capture import BlockWriter, Capture, CaptureError, CaptureWriter
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for, engine_for
+from sniff.engine.read_source import ReadSource
 from sniff.engine.session import Item, LineEvent, Session
 from sniff.formats import cut_capture, parquet
 from sniff.formats.parquet import Kind, ParquetWriter

@@ -13,9 +13,9 @@ from dissectors.line import NS_PER_S
 from sniff.analysis.judging import Judging
 from sniff.bus.offline import survey
 from sniff.devices import noted_devices
-from sniff.engine.capture import ReadSource
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.read_source import ReadSource
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
 
 if TYPE_CHECKING:

@@ -38,6 +38,11 @@ class Block:
     def __len__(self) -> int:
         return len(self.reads)
 
+    @property
+    def latest(self) -> int:
+        """When the last read came, ns."""
+        return int(self.reads.times[-1])
+
     def take(self, which: Masks) -> Block | None:
         """Some of the reads; None for none of them."""
         if which.all():

@@ -18,13 +18,14 @@ from dissectors.line import Timing
 from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction
 from sniff.engine.blocks import Block
-from sniff.engine.capture import CaptureError, KeepsTables, ReadSource
+from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Engine, Output, Row
 from sniff.engine.follow_settings import SessionEngine
 from sniff.engine.framing import BulkFraming, Clean, Stretch
 from sniff.engine.gathering import gathered
 from sniff.engine.late_columns import LateColumns
 from sniff.engine.placing import Placing, RowsAhead
+from sniff.engine.read_source import KeepsTables, ReadSource
 from sniff.engine.session import LineEvent, Session, settings_change
 from sniff.engine.table import Table, joined
 

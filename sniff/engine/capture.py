@@ -10,7 +10,6 @@ from sniff.engine.session import Completeness, Item, LineEvent, Session
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
-    from sniff.engine.table import Table
 
 
 class Capture(Protocol):
@@ -29,28 +28,6 @@ class Capture(Protocol):
 
     def completeness(self) -> Completeness:
         """Whether the file is whole (may need to have read it)."""
-        ...
-
-
-class ReadSource(Protocol):
-    """Reads, one by one and in blocks."""
-
-    def items(self) -> Iterator[Item]:
-        """See `Capture`."""
-        ...
-
-    def blocks(self) -> Iterator[Block | LineEvent]:
-        """See `Capture`."""
-        ...
-
-
-@runtime_checkable
-class KeepsTables(Protocol):
-    """A capture that may hold what the engine finds in it."""
-
-    def stored_tables(self, session: Session) -> Iterator[Table | LineEvent] | None:
-        """What `bulk.tables` gives of its blocks with this session; None where it does not hold just that. Raises
-        CaptureError, then and while they are taken."""
         ...
 
 

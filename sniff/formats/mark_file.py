@@ -8,26 +8,32 @@ lines win. Lines are only ever added.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from sniff.engine.capture import Capture, KeepsTables
+from sniff.engine.capture import Capture
 from sniff.engine.session import Completeness, Item, LineEvent, LineEventKind, Session
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
-    from sniff.engine.table import Table
 
-Given = TypeVar("Given")
+
+class _Many(Protocol):
+    """Many reads, or rows. `latest`: ns, when the last of them came or ended."""
+
+    @property
+    def latest(self) -> int: ...
+
+
+Many = TypeVar("Many", bound=_Many)
 
 SUFFIX = ".marks.jsonl"
 LARGEST = 1 << 20
 """Octets of such a file that are read."""
 LONGEST = 2000
 """Characters of a mark."""
-_FAR = 1 << 62  # ns
 
 
 def mark_file(path: str | Path) -> Path:
@@ -160,20 +166,18 @@ class MarkedCapture:
 
     def blocks(self) -> Iterator[Block | LineEvent]:
         """The same as columns; a mark stands before the block that holds its moment, which is all that it needs."""
-        return self._among(self._capture.blocks(), _last_read)
+        return self._among(self._capture.blocks())
 
-    def stored_tables(self, session: Session) -> Iterator[Table | LineEvent] | None:
-        """What the capture holds, with the marks before the tables that hold their moments."""
-        held = self._capture.stored_tables(session) if isinstance(self._capture, KeepsTables) else None
-        return None if held is None else self._among(held, _end_of)
+    def stored_tables(self, session: Session) -> Iterator[Any] | None:
+        """What the capture holds (`engine.read_source.KeepsTables`), with the marks before what holds their moments."""
+        stored = getattr(self._capture, "stored_tables", None)
+        held = None if stored is None else stored(session)
+        return None if held is None else self._among(held)
 
-    def _among(
-        self, items: Iterator[Given | LineEvent], end_of: Callable[[Given | LineEvent], int]
-    ) -> Iterator[Given | LineEvent]:
-        """The marks among items that end when `end_of` says (ns)."""
+    def _among(self, items: Iterator[Many | LineEvent]) -> Iterator[Many | LineEvent]:
         waiting, own, last = self._waiting(), list[LineEvent](), 0
         for item in items:
-            last = end_of(item)
+            last = item.time if isinstance(item, LineEvent) else item.latest
             while waiting and waiting[0].time <= last:
                 yield waiting.pop(0)
             yield item
@@ -194,14 +198,6 @@ class MarkedCapture:
     def completeness(self) -> Completeness:
         """As the capture's."""
         return self._capture.completeness()
-
-
-def _last_read(item: Block | LineEvent) -> int:
-    return item.time if isinstance(item, LineEvent) else int(item.reads.times[-1])
-
-
-def _end_of(item: Table | LineEvent) -> int:
-    return item.time if isinstance(item, LineEvent) else int(item.frames.end.max(initial=-_FAR))
 
 
 def with_marks(capture: Capture, path: str | Path) -> Capture:

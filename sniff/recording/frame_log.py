@@ -106,8 +106,7 @@ class FrameLog:
 def _pieces(table: Table) -> Iterator[Table]:
     """The table in parts of about equal length, so that none holds only what was left over."""
     count = max(1, round(len(table) / AT_ONCE))
-    for part in range(count):
-        yield table.part(len(table) * part // count, len(table) * (part + 1) // count) if count > 1 else table
+    return table.parts([len(table) * part // count for part in range(count + 1)]) if count > 1 else iter((table,))
 
 
 def _span(table: Table) -> tuple[int, int]:

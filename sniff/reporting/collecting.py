@@ -22,9 +22,10 @@ from sniff.analysis.wording import describe
 from sniff.bus.model import BusModel
 from sniff.bus.offline import outputs, survey
 from sniff.bus.sifting import shown_findings, sift
-from sniff.engine.capture import Capture, ReadSource
+from sniff.engine.capture import Capture
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.read_source import ReadSource
 from sniff.engine.session import DEVICES_NOTE, LineEvent, Session
 from sniff.filter import Filter
 from sniff.formats.text import iso
