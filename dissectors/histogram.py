@@ -119,6 +119,10 @@ def add_grouped(
 
     if not len(values):
         return
+    if len(values) < _FEW:
+        for group, value in zip(groups.tolist(), values.tolist(), strict=True):
+            of(group).add(value)
+        return
     values = np.maximum(values, 0)
     if int(values.max()) < 1 << _VALUE_BITS and int(groups.max()) < 1 << (63 - _VALUE_BITS):
         both = groups.astype(np.int64) << _VALUE_BITS | values  # sorted far faster than by a key
@@ -146,6 +150,9 @@ def add_grouped(
         histogram.least = least if histogram.least is None else min(histogram.least, least)
         histogram.most = most if histogram.most is None else max(histogram.most, most)
 
+
+_FEW = 64
+"""Values that cost less one after the other."""
 
 _VALUE_BITS = 48
 """Bits of a value that is sorted together with its group: 78 hours in ns."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -14,16 +14,15 @@ Cell = str | int | float | None
 
 
 class RingWindow(Protocol):
-    """What changed in a ring between two looks: numbers of the bus, and of each station by address."""
+    """What was new in a ring in a stretch of rows: numbers of the bus, and of each station."""
 
     @property
     def bus(self) -> Mapping[str, object]:
         """Numbers of the whole ring, by name."""
         ...
 
-    @property
-    def nodes(self) -> Mapping[int, Mapping[str, object]]:
-        """Numbers of its stations."""
+    def of(self, address: int) -> Mapping[str, object]:
+        """Numbers of a station; empty where there are none."""
         ...
 
 
@@ -42,6 +41,10 @@ class RingObserver(Protocol):
         """The ring so far, a value of the protocol's own."""
         ...
 
+    def window(self) -> RingWindow:
+        """What is new since this was called the last time; the first time is not told of."""
+        ...
+
 
 @runtime_checkable
 class WatchesColumns(Protocol):
@@ -51,6 +54,14 @@ class WatchesColumns(Protocol):
         """Take rows; the same as one after the other. What they closed is nothing to it."""
         ...
 
+    def windows(self, stops: Sequence[tuple[int, int]]) -> Sequence[RingWindow]:
+        """What was new before each of some rows, and not before the one named before it, in this call or an earlier
+        one; of what came before the first call nothing need be known.
+
+        `stops`: numbers of rows, ascending, up to the one that comes next, each with the end of all rows before it, ns.
+        """
+        ...
+
 
 @runtime_checkable
 class WatchesRing(Protocol):
@@ -58,6 +69,10 @@ class WatchesRing(Protocol):
 
     def ring(self) -> Any:
         """The ring so far, a value of the protocol's own."""
+        ...
+
+    def window(self) -> RingWindow:
+        """What is new since this was called the last time; the first time is not told of."""
         ...
 
 
@@ -73,7 +88,7 @@ class StationTable:
 class TokenRing:
     """How a protocol's ring is watched and shown; `ring` is what its observer gives.
 
-    `observer(timing)`: watches a bus. `window(before, after)`: what changed between two looks.
+    `observer(timing)`: watches a bus.
     `order(ring)`: its masters in the order of the token; empty when no closed ring was seen.
     `headings`, `rows(ring)`: a table, one row a master. `sentences(ring)`: what it comes to. `stations`: of who answers
     only, where the protocol has such. `identities(ring)`: the numbers by which stations called themselves, by address;
@@ -81,7 +96,6 @@ class TokenRing:
     """
 
     observer: Callable[[Timing], RingObserver]
-    window: Callable[[Any, Any], RingWindow]
     order: Callable[[Any], tuple[int, ...]]
     headings: tuple[str, ...]
     rows: Callable[[Any], list[tuple[Cell, ...]]]

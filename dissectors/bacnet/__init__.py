@@ -31,7 +31,6 @@ __all__ = [
 packet = on_first_use("dissectors.bacnet.packets:packet")
 judge = on_first_use("dissectors.bacnet.findings:MstpFindings")
 watch = on_first_use("dissectors.bacnet.bulk_ring_observer:BulkRingObserver")
-ring_window = on_first_use("dissectors.bacnet.ring_window:ring_window")
 renamer = on_first_use("dissectors.bacnet.renamer:MstpRenamer")
 stencil = on_first_use("dissectors.bacnet.stencils:mstp_stencil")
 kernel = on_first_use("dissectors.bacnet.kernel:kernel")
@@ -55,7 +54,6 @@ def sieve(octets: bytes) -> bool:
 
 RING = TokenRing(
     observer=watch,
-    window=ring_window,
     order=lambda ring: ring.order,
     headings=ring_table.HEADINGS,
     rows=ring_table.rows,

@@ -14,6 +14,7 @@ from dissectors.bacnet.findings_of_use import polls, use
 from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.ring import COARSE_LIMIT, Ring, RingEventKind, RingNode, lies_between
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
+from dissectors.bacnet.ring_window import MstpRingWindow
 from dissectors.bacnet.rules import RULES
 from dissectors.chances import is_rare
 from dissectors.findings import Finding, Severity, as_consequence, counted, times
@@ -321,6 +322,10 @@ class MstpFindings:
     def ring(self) -> Ring:
         """The ring so far."""
         return self._observer.ring()
+
+    def window(self) -> MstpRingWindow:
+        """What is new since this was called the last time; the first time is not told of."""
+        return self._observer.window()
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far, the gravest first."""

@@ -304,15 +304,7 @@ class Ring:
         for (source, destination), edge in self.edges.items():
             if source not in newest or edge.last > newest[source][0]:
                 newest[source] = (edge.last, destination)
-        best: tuple[int, ...] = ()
-        for start in sorted(newest):
-            walk = [start]
-            while walk[-1] in newest and newest[walk[-1]][1] not in walk:
-                walk.append(newest[walk[-1]][1])
-            closes = walk[-1] in newest and newest[walk[-1]][1] == start
-            if closes and len(walk) > len(best):
-                best = tuple(walk)
-        return best
+        return order_of({source: destination for source, (_, destination) in newest.items()})
 
     @property
     def predicted_loop(self) -> int | None:
@@ -385,3 +377,24 @@ class Ring:
                 }
             ),
         )
+
+
+def order_of(newest: Mapping[int, int]) -> tuple[int, ...]:
+    """The longest ring that the newest tokens close, from its lowest address on. `newest`: to whom each station passed
+    the token last."""
+    best: list[int] = []
+    walked: dict[int, int] = {}  # from which address each was reached first
+    for start in sorted(newest):
+        walk: list[int] = []
+        at = start
+        while at in newest and at not in walked:
+            walked[at] = start
+            walk.append(at)
+            at = newest[at]
+        if walked.get(at) == start:
+            ring = walk[walk.index(at) :]
+            lowest = ring.index(min(ring))
+            ring = ring[lowest:] + ring[:lowest]
+            if len(ring) > len(best) or (len(ring) == len(best) and ring < best):
+                best = ring
+    return tuple(best)

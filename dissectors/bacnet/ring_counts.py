@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dissectors.bacnet.limits import T_NO_TOKEN, T_USAGE_DELAY
+from dissectors.bacnet.ring_window import Happening
 from dissectors.columns import counted
 from dissectors.histogram import add_grouped
 
@@ -49,7 +50,7 @@ class RingCounts:
         self._polling = self._pairs >> 8
         self._known: tuple[set[int], ...] = (set(), set(), set(), set(), set())
         # what the first token of a run says, by station
-        self._loops: list[tuple[int, int]] = []
+        self._loops: list[tuple[int, int, int]] = []  # with its place
         self._holds: list[tuple[int, int]] = []
         self._held: list[tuple[int, int]] = []
 
@@ -135,10 +136,11 @@ class RingCounts:
         tally, some = self._tally, slice(first, beyond)
         edges, ends = self._edges[some], self._columns.end[self._tokens[some]]
         new = np.flatnonzero(self._before_same[some] < begin)
-        for edge, time in zip(edges[new].tolist(), ends[new].tolist(), strict=True):
+        places = self._tokens[some][new].tolist()
+        for place, edge, time in zip(places, edges[new].tolist(), ends[new].tolist(), strict=True):
             got = tally.nodes[edge & 0xFF].got
             if got is not None:
-                self._loops.append((edge & 0xFF, time - got))
+                self._loops.append((edge & 0xFF, time - got, place))
         for mac, time in _lasts(edges & 0xFF, ends).items():
             tally.nodes[mac].got = tally.nodes[mac].last_token = time
         for edge, time in _lasts(edges, ends).items():
@@ -188,6 +190,7 @@ class RingCounts:
             tally.nodes[mac].octets += int(octets[mac])
         used = rows[columns.token[rows - 1]]
         add_grouped(lambda mac: tally.nodes[mac].use, columns.source[used], columns.gap[used])
+        self._note(Happening.USE, used, columns.source[used], columns.gap[used])
         tokens = self._tokens[taken[self._tokens]]
         self._add_tokens(tokens, np.repeat(begins, ends - begins)[np.searchsorted(rows, tokens)], taken)
         self._add_polls(rows)
@@ -199,12 +202,17 @@ class RingCounts:
         source, destination = columns.source[tokens], columns.destination[tokens]
         self._count("tokens_sent", source)
         self._count("tokens_received", destination)
+        self._note(Happening.RECEIVED, tokens, destination)
+        self._note(Happening.PASSED, tokens, source, destination)
         for (edge,), count in counted(source << 8 | destination):
             self._tally.edges[edge >> 8, edge & 0xFF].tokens += count
         same = self._before_same[taken[self._tokens]]
         again = same >= begins
         values = columns.end[tokens[again]] - columns.end[same[again]]
-        add_grouped(lambda mac: nodes[mac].loop, *_with(destination[again], values, self._loops))
+        loops, at_begin = _with(destination[again], values, [loop[:2] for loop in self._loops]), self._loops
+        add_grouped(lambda mac: nodes[mac].loop, *loops)
+        places = np.concatenate([tokens[again], np.array([place for *_, place in at_begin], np.int64)])
+        self._note(Happening.LOOP, places, *loops)
         again = tokens[:-1] >= begins[1:]
         now, before = tokens[1:][again], tokens[:-1][again]
         macs, holds = _with(columns.source[now], self._sent[now] - self._sent[before], self._holds)
@@ -227,10 +235,13 @@ class RingCounts:
         add_grouped(lambda mac: nodes[mac].poll_reply, columns.source[replies], columns.gap[replies])
         gone_on = rows[columns.poll[rows - 1] & ~columns.poll_reply[rows]]
         wasted = columns.start[gone_on] - columns.start[gone_on - 1]
-        self._tally.poll_waste += int(np.clip(wasted, 0, T_NO_TOKEN).sum())
+        wasted = np.clip(wasted, 0, T_NO_TOKEN)
+        self._tally.poll_waste += int(wasted.sum())
         source, waited = columns.source[gone_on], columns.gap[gone_on]
         add_grouped(lambda mac: nodes[mac].poll_wait, source, waited)
         self._count("polls_unanswered", source)
+        self._note(Happening.UNANSWERED, gone_on, source)
+        self._note(Happening.WASTED, gone_on, source, wasted)
         self._count("polls_waited", source[waited - columns.slack[gone_on] > T_USAGE_DELAY])
 
     def _add_data(self, rows: Times) -> None:
@@ -244,6 +255,10 @@ class RingCounts:
         replies = data[columns.answers[data]]
         self._count("replies", columns.source[replies])
         add_grouped(lambda mac: nodes[mac].reply, columns.source[replies], columns.gap[replies])
+
+    def _note(self, what: Happening, places: Times, macs: Times, values: Times | None = None) -> None:
+        if self._tally.journal is not None:
+            self._tally.journal.note_many(what, self._columns.rows.first + places, macs, values)
 
     def _count(self, what: str, macs: Times) -> None:
         """One more of `what` for each time that an address stands there."""

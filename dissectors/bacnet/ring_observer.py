@@ -7,6 +7,8 @@ where the read was not held back (`held_reads.py`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from dissectors.bacnet.frame_types import CARRIES_NPDU, EXPECTING, PROPRIETARY, FrameType
 from dissectors.bacnet.header import is_whole_header
 from dissectors.bacnet.limits import BROADCAST, MAX_MASTER, N_MIN_OCTETS, T_NO_TOKEN
@@ -16,6 +18,7 @@ from dissectors.bacnet.ring_addresses import check_addresses, see_i_am
 from dissectors.bacnet.ring_damage import count_damage, speaker_of
 from dissectors.bacnet.ring_questions import AskedInRing
 from dissectors.bacnet.ring_tally import NodeTally
+from dissectors.bacnet.ring_window import Happening, MstpRingWindow, RingJournal
 from dissectors.bacnet.storms import Storms
 from dissectors.bacnet.token_watch import TokenWatch
 from dissectors.bacnet.turn import Turn
@@ -33,6 +36,10 @@ _TOKEN, _POLL, _POLL_REPLY, _TEST, _TEST_REPLY, _POSTPONED = map(
         FrameType.REPLY_POSTPONED,
     ),
 )
+
+
+FAR = 1 << 62
+"""Behind every row."""
 
 
 class MstpRingObserver(TokenWatch):
@@ -97,6 +104,16 @@ class MstpRingObserver(TokenWatch):
     def ring(self) -> Ring:
         """All that was seen so far."""
         return self._tally.value()
+
+    def window(self) -> MstpRingWindow:
+        """What is new since this was called the last time; the first time is not told of."""
+        return self.windows([(FAR, self._tally.last)])[0]
+
+    def windows(self, stops: Sequence[tuple[int, int]]) -> list[MstpRingWindow]:
+        """See `dissectors.token_ring.WatchesColumns`."""
+        if self._tally.journal is None:
+            self._tally.journal = RingJournal()
+        return self._tally.journal.windows(stops, self._tally.first) if stops else []
 
     # Holes and damage
 
@@ -173,6 +190,7 @@ class MstpRingObserver(TokenWatch):
                 node.gone = False
         elif frame_type == _POSTPONED:
             node.postponed += 1
+            tally.enter(Happening.POSTPONED, no, source)
         elif frame_type != _TEST_REPLY:
             if not answers:
                 self._take_turn(no, frame, source, node, header)

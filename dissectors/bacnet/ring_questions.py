@@ -12,6 +12,7 @@ from dissectors.bacnet.limits import MS, T_NO_TOKEN, T_REPLY_DELAY, T_USAGE_DELA
 from dissectors.bacnet.message import data_of, more_follows
 from dissectors.bacnet.ring import RingEvent, RingEventKind
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
+from dissectors.bacnet.ring_window import Happening
 from dissectors.bacnet.unheard import UnheardFrames
 from dissectors.frame import Frame
 
@@ -136,8 +137,11 @@ class RingQuestions:
         if not self.doubt and self._unheard.poll_answered(asked.no, asked.frame, frame):
             return
         node = self._tally.node(asked.source)
-        self._tally.poll_waste += max(0, min(frame.start - asked.frame.start, T_NO_TOKEN))
+        wasted = max(0, min(frame.start - asked.frame.start, T_NO_TOKEN))
+        self._tally.poll_waste += wasted
         node.polls_unanswered += 1
+        self._tally.enter(Happening.UNANSWERED, no, asked.source)
+        self._tally.enter(Happening.WASTED, no, asked.source, wasted)
         if source == asked.source:
             self._go_on(asked, no, frame, node)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from dissectors.bacnet.ring import SUMS, Edge, Happened, Ring, RingEvent, RingEventKind, RingNode
+from dissectors.bacnet.ring_window import Happening, RingJournal
 from dissectors.histogram import Histogram
 from dissectors.line import Timing
 
@@ -105,6 +106,7 @@ class RingTally:
     edges: dict[tuple[int, int], EdgeTally] = field(default_factory=dict)
     happened: dict[tuple[RingEventKind, int | None], Happened] = field(default_factory=dict)
     polled: dict[tuple[int, int], int] = field(default_factory=dict)
+    journal: RingJournal | None = None  # where somebody asks what is new
 
     def node(self, mac: int) -> NodeTally:
         """The node of an address, a new one when it was not known."""
@@ -132,6 +134,13 @@ class RingTally:
         """Something happened: arguments as in `RingEvent`."""
         key = (what, mac)
         self.happened[key] = self.happened.get(key, Happened()).add(RingEvent(what, time, no, mac, other, value))
+        if what is RingEventKind.LOST_TOKEN:
+            self.enter(Happening.LOST, no, 0)
+
+    def enter(self, what: Happening, no: int, mac: int, value: int = 0) -> None:
+        """It happened in a row: into the journal, where there is one."""
+        if self.journal is not None:
+            self.journal.note(what, no, mac, value)
 
     def take_back(self, what: RingEventKind, no: int, mac: int | None) -> None:
         """What was noted of frame `no` turned out to be nothing."""

@@ -17,6 +17,7 @@ from dissectors.bacnet.repeated_token import RepeatedToken
 from dissectors.bacnet.ring import RingEvent, RingEventKind
 from dissectors.bacnet.ring_questions import RingQuestions, is_proprietary_answer, is_second_answer
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
+from dissectors.bacnet.ring_window import Happening
 from dissectors.bacnet.searches import begin_search, end_search
 from dissectors.bacnet.second_tokens import GivenUp, SecondTokens
 from dissectors.bacnet.unheard import UnheardFrames
@@ -106,6 +107,7 @@ class TokenWatch:
                 gap = frame.start - self._token.end
                 if not self._doubt:
                     node.use.add(gap)
+                    self._tally.enter(Happening.USE, no, source, gap)
                     if surely_over(frame, self._token, T_USAGE_DELAY):
                         self._late(RingEventKind.LATE_USE, no, frame, source, self._passed_by, gap)
                 self._token = self._passed_by = None
@@ -217,6 +219,7 @@ class TokenWatch:
         edge = tally.edges.get((source, destination)) or tally.edge(source, destination)
         target = tally.nodes.get(destination) or tally.node(destination)
         edge.tokens += 1
+        tally.enter(Happening.PASSED, no, source, destination)
         edge.last = target.last_token = frame.end
         if node.next != destination:
             node.next, edge.since, edge.streak = destination, frame.start, 0
@@ -232,13 +235,17 @@ class TokenWatch:
         if again and before is not None:
             self._repeated.repeat(destination, before.end)
             edge.retries += 1
+            tally.enter(Happening.RETRY, no, source)
             tally.note(RingEventKind.RETRY, frame.start, no, destination, source, self._gap(frame))
         else:
             hold = min(self._hold, _HOLD_MAX)
             node.holds[hold] = node.holds.get(hold, 0) + 1
             target.tokens_received += 1
-            if target.got is not None:
-                target.loop.add(frame.end - target.got)
+            loop = None if target.got is None else frame.end - target.got
+            if loop is not None:
+                target.loop.add(loop)
+                tally.enter(Happening.LOOP, no, destination, loop)
+            tally.enter(Happening.RECEIVED, no, destination)
             target.got = frame.end
         self._hold = 0
         if source == destination:

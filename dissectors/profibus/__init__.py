@@ -39,7 +39,6 @@ def sieve(octets: bytes) -> bool:
 
 RING = TokenRing(
     observer=watch,
-    window=on_first_use("dissectors.profibus.ring:ring_window"),
     order=lambda ring: ring.order,
     headings=ring_words.HEADINGS,
     rows=ring_words.rows,

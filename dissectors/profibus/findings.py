@@ -11,7 +11,7 @@ from dissectors.line import NS_PER_S, Timing
 from dissectors.profibus.configuration import parse_configuration
 from dissectors.profibus.diagnosis import CONFIGURATION_FAULT, PARAMETER_FAULT
 from dissectors.profibus.record import RequestsRecord, joined
-from dissectors.profibus.ring import Ring
+from dissectors.profibus.ring import Ring, RingWindow
 from dissectors.profibus.rules import RULES, usual_tsdr
 from dissectors.profibus.slave_watch import SlaveView
 from dissectors.profibus.watch import BusWatch, Notice
@@ -97,6 +97,10 @@ class ProfibusFindings:
     def ring(self) -> Ring:
         """The ring so far."""
         return self.watch.ring()
+
+    def window(self) -> RingWindow:
+        """What is new since this was called the last time; the first time is not told of."""
+        return self.watch.window()
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far."""

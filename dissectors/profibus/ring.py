@@ -89,8 +89,12 @@ class Ring:
 class RingWindow:
     """`bus`: of the whole ring. `nodes`: of each master. Named as every ring's are; names say the unit."""
 
-    bus: Numbers
-    nodes: Mapping[int, Numbers]
+    bus: Numbers = field(default_factory=dict)
+    nodes: Mapping[int, Numbers] = field(default_factory=dict)
+
+    def of(self, address: int) -> Numbers:
+        """Of a master; empty for any other."""
+        return self.nodes.get(address, {})
 
 
 def ring_window(before: Ring, now: Ring) -> RingWindow:

@@ -13,7 +13,7 @@ from dissectors.frame import Event, Frame, Header
 from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S, Timing
 from dissectors.profibus.parameters import parse_global_control
-from dissectors.profibus.ring import MasterView, Ring, SlaveRow
+from dissectors.profibus.ring import MasterView, Ring, RingWindow, SlaveRow, ring_window
 from dissectors.profibus.services import Service, service_of
 from dissectors.profibus.slave_state import SlaveState
 from dissectors.profibus.slave_watch import SlaveView
@@ -95,6 +95,7 @@ class BusWatch:
         self._first: int | None = None
         self._last = 0
         self._wasted = 0
+        self._looked: Ring | None = None
         self._heard = self._slack = 0  # end of the row before, and by how much it may have been earlier
         self._least_claim = timing.line.bits(_LEAST_CLAIM)
         self._holder: int | None = None
@@ -166,6 +167,11 @@ class BusWatch:
             if view.state is not None
         }
         return Ring(masters, slaves, self._first or 0, self._last, self._wasted)
+
+    def window(self) -> RingWindow:
+        """What is new since this was called the last time; the first time is not told of."""
+        before, self._looked = self._looked, self.ring()
+        return RingWindow() if before is None else ring_window(before, self._looked)
 
     def _master(self, address: int) -> _Master:
         return self._masters.setdefault(address, _Master())

@@ -82,6 +82,11 @@ def health_of(summary: Summary, findings: Iterable[Finding] = ()) -> HealthRepor
     return HealthReport(bus, stations)
 
 
+def bus_health(summary: Summary) -> Health:
+    """Health of the bus alone, of which nobody has found anything."""
+    return _bus_health(summary, [node for node in summary.nodes if _is_there(node, {})], ())
+
+
 def station_of(finding: Finding) -> int | None:
     """The station that a finding is about: of "0 → 27" it is 27."""
     return finding.about.station

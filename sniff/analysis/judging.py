@@ -12,7 +12,7 @@ from dissectors.frame import Noise, Place, Reason
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.row_columns import JudgesColumns, in_turn
-from dissectors.token_ring import WatchesRing
+from dissectors.token_ring import RingWindow, WatchesRing
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.bulk_line_findings import BulkLineFindings
 from sniff.analysis.judgement import Judgement
@@ -176,6 +176,11 @@ class Judging:
     def ring(self) -> Any:
         """The token ring so far, a value of the protocol's own; None where no token is passed."""
         return self.judge.ring() if isinstance(self.judge, WatchesRing) else None
+
+    def ring_window(self) -> RingWindow | None:
+        """What is new in it since this was called the last time; the first time is not told of. None where no token is
+        passed."""
+        return self.judge.window() if isinstance(self.judge, WatchesRing) else None
 
     def _is_torn(self, transaction: Transaction) -> bool:
         """Whether octets were lost inside it, so that what is missing says nothing about the bus."""

@@ -9,13 +9,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 from dissectors.findings import Finding, Severity
 from dissectors.histogram import Histogram
 from dissectors.line import MS, NS_PER_S
+from dissectors.token_ring import RingWindow
 from dissectors.tracker import Verdict
-from sniff.analysis.health import health_of, station_health
+from sniff.analysis.health import bus_health, station_health
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
 from sniff.bus.model import BusModel
@@ -59,19 +59,20 @@ class BusChannels:
     """Messages of one bus, of what its model knows; `due` gives what is to be written by then."""
 
     def __init__(
-        self, model: BusModel, judged_every: int = JUDGED_EVERY, ring_of: Callable[[], Any] | None = None
+        self,
+        model: BusModel,
+        judged_every: int = JUDGED_EVERY,
+        ring_window: Callable[[], RingWindow | None] | None = None,
     ) -> None:
-        """`judged_every`: windows between two looks at the findings; 0: only when asked. `ring_of`: gives the ring
-        by the end of each window; else the model does.
+        """`judged_every`: windows between two looks at the findings; 0: only when asked. `ring_window`: gives what
+        changed in the ring since it was called the last time; else the model does.
         """
         self._model = model
         self._judged_every = judged_every
-        session, ring = model.session, model.dissector.ring
-        self._session = session
+        self._session = session = model.session
         self._bus = topic_part(session.bus) or "bus"
-        self._compare = ring.window if ring is not None else None
-        self._ring_of = model.ring if ring_of is None else ring_of
-        self._ring = self._ring_of()
+        self._ring_window = model.ring_window if ring_window is None else ring_window
+        self._ring_window()
         self._window = Summary(session.line)
         self._has_part = False  # whether anything is counted in it
         self._begin: int | None = None
@@ -136,24 +137,17 @@ class BusChannels:
             "octets": window.octets,
             "errors": errors,
             "error_rate": min(1.0, errors / window.frames) if window.frames else 0.0,
-            "health": health_of(window).bus.score,
+            "health": bus_health(window).score,
             **_latency(window.latency),
         }
-        whole, each = self._turn_of_ring()
-        yield DerivedMessage(f"/bus/{self._bus}", BUS, end, begin, _json(content | whole))
+        ring = self._ring_window()
+        whole = {} if ring is None else ring.bus
+        yield DerivedMessage(f"/bus/{self._bus}", BUS, end, begin, _json(content | dict(whole)))
         for node in window.nodes.present():
             topic = f"/nodes/{self._bus}/{node.address}"
             if has_turn(topic, end):
-                told = _of_node(node) | each.get(node.address, {})
+                told = _of_node(node) | dict({} if ring is None else ring.of(node.address))
                 yield DerivedMessage(topic, NODE, end, begin, _json(told))
-
-    def _turn_of_ring(self) -> tuple[dict[str, object], dict[int, dict[str, object]]]:
-        """Numbers of the ring and of its stations since the last call."""
-        if self._compare is None:
-            return {}, {}
-        before, self._ring = self._ring, self._ring_of()
-        window = self._compare(before, self._ring)
-        return dict(window.bus), {mac: dict(numbers) for mac, numbers in window.nodes.items()}
 
 
 def _of_node(node: Node) -> dict[str, object]:

@@ -26,9 +26,10 @@ from sniff.bus.rows import Store
 from sniff.bus.second_protocol import ForeignFrames
 from sniff.engine.blocks import in_pieces
 from sniff.engine.bulk import tables
-from sniff.engine.capture import Capture, CaptureError, KeepsTables
+from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.packed_table import PackedTable
+from sniff.engine.read_source import KeepsTables
 from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table
 from sniff.formats.files import watched
@@ -198,8 +199,7 @@ class FileFeed:
             if isinstance(item, LineEvent):
                 yield item
             else:
-                for begin in range(0, max(1, len(item)), READS):
-                    yield item.part(begin, min(begin + READS, len(item)))
+                yield from item.parts([*range(0, len(item), READS), len(item)] if len(item) else [0, 0])
 
     def _see(self) -> None:
         """Look for a second protocol; of a thread, for all protocols have to be imported when it is asked for."""

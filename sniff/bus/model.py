@@ -17,6 +17,7 @@ from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, Session
 
 if TYPE_CHECKING:
+    from dissectors.token_ring import RingWindow
     from sniff.analysis.point_reader import PointReader, Sample
     from sniff.analysis.points import PointTable
     from sniff.analysis.polls import Polls
@@ -156,3 +157,8 @@ class BusModel:
     def ring(self) -> Any:
         """The token ring so far, a value of the protocol's own; None where no token is passed."""
         return self.judging.ring()
+
+    def ring_window(self) -> RingWindow | None:
+        """What is new in it since this was called the last time; the first time is not told of. None where no token is
+        passed."""
+        return self.judging.ring_window()

@@ -7,6 +7,7 @@ told once, when all is read, at the time of their last evidence. Pure: messages 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,10 +18,19 @@ from sniff.bus.derived_topics import NODES_A_SECOND, NODES_AT_ONCE, WINDOW, BusC
 from sniff.bus.model import BusModel
 from sniff.bus.recorded_values import RecordedValues
 from sniff.bus.thinning import Budget
+from sniff.bus.value_topics import ValueMessage
 from sniff.bus.watched_ring import WatchedRing
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table
+
+
+class _Stretch(NamedTuple):
+    """Rows `begin` to before `stop` of a table; `over`: when the windows end that are over then, ns."""
+
+    begin: int
+    stop: int
+    over: tuple[int, ...]
 
 
 class OfflineTopics:
@@ -33,8 +43,8 @@ class OfflineTopics:
         self._line = session.line
         ring = dissector.ring
         self._ring = WatchedRing(ring.observer(session.timing)) if ring is not None else None
-        ring_of = self._ring.observer.ring if self._ring is not None else None
-        self._channels = BusChannels(self._model, judged_every=0, ring_of=ring_of)
+        window = self._ring.window if self._ring is not None else None
+        self._channels = BusChannels(self._model, judged_every=0, ring_window=window)
         self._values = RecordedValues(session.bus, dissector, devices) if with_values else None
         self._nodes = Budget(NODES_A_SECOND, NODES_AT_ONCE)
         self._end: int | None = None  # of the window
@@ -50,36 +60,56 @@ class OfflineTopics:
         """Take rows; what is to be written by then."""
         self._model.add_table(table)
         if len(table) and table.has_true_times:
-            ends = np.maximum.accumulate(np.maximum(table.frames.end, self._last))
+            before = self._last
+            ends = np.maximum.accumulate(np.maximum(table.frames.end, before))
             self._last = int(ends[-1])
             if self._end is None:
                 self._end = int(ends[0]) + WINDOW
                 self._due(int(ends[0]))
-            yield from self._window_by_window(table, ends, self._stops(ends, self._end))
+            yield from self._stretch_by_stretch(table, self._stretches(ends), np.append(before, ends))
         elif table:
             self._channels.add_table(table)
-            yield from self._part(table)
+            if self._ring is not None:
+                self._ring.add_table(table)
+            if self._values is not None:
+                self._values.hear(int(table.frames.length.sum()), len(table))
+                yield from map(_value, self._values.of_rows(table))
 
-    def _window_by_window(self, table: Table, ends: Times, stops: list[int]) -> Iterator[DerivedMessage]:
-        """Rows that end by `ends`; those before each of `stops` belong to one window."""
-        at = 0
-        for stop, summary in zip(stops, summaries(self._line, table, stops), strict=True):
-            if stop > at:
+    def _stretches(self, ends: Times) -> list[_Stretch]:
+        """Of rows that end by `ends`: those of a window each, the last of which is still open."""
+        assert self._end is not None
+        made: list[_Stretch] = []
+        begin = 0
+        while True:
+            stop = int(np.searchsorted(ends, self._end))
+            if stop == len(ends):
+                return [*made, _Stretch(begin, stop, ())]
+            over = _windows_over(self._end, int(ends[stop]))
+            made.append(_Stretch(begin, stop, over))
+            begin, self._end = stop, over[-1] + WINDOW
+
+    def _stretch_by_stretch(self, table: Table, stretches: list[_Stretch], ends: Times) -> Iterator[DerivedMessage]:
+        """`ends`: of all before each row."""
+        stops = [stretch.stop for stretch in stretches]
+        values, ring, parts = self._values, self._ring, None
+        lengths = np.cumsum(np.append(0, table.frames.length)).tolist()
+        telling = None if values is None else values.of_table(table)
+        if ring is not None:
+            told = [(table.first + one.stop, int(ends[one.stop])) for one in stretches for _ in one.over]
+            parts = None if ring.add_ahead(table, told) else table.parts([0, *stops])
+        for stretch, summary in zip(stretches, summaries(self._line, table, stops), strict=True):
+            begin, stop = stretch.begin, stretch.stop
+            if ring is not None and parts is not None:
+                ring.add_table(next(parts))
+            if stop > begin:
                 self._channels.add_summary(summary)
-                yield from self._part(table.part(at, stop))
-            if stop < len(table):
-                yield from self._windows(int(ends[stop]))
-            at = stop
-
-    @staticmethod
-    def _stops(ends: Times, end: int) -> list[int]:
-        """Places in front of which a window is over, and that of the table's end. `end`: of the window that is open."""
-        stops: list[int] = []
-        while not stops or stops[-1] < len(ends):
-            stops.append(int(np.searchsorted(ends, end)))
-            if stops[-1] < len(ends):
-                end = _last_due(end, int(ends[stops[-1]])) + WINDOW
-        return stops
+                if values is not None and telling is not None:
+                    values.hear(lengths[stop] - lengths[begin], stop - begin)
+                    yield from map(_value, telling.until(stop))
+            for now in stretch.over:
+                yield from self._due(now)
+        if telling is not None:
+            yield from map(_value, telling.rest())
 
     def close(self) -> Iterator[DerivedMessage]:
         """What is left: the last window and the findings."""
@@ -88,27 +118,13 @@ class OfflineTopics:
         yield from self._channels.findings()
 
     def _part(self, part: Table) -> Iterator[DerivedMessage]:
-        """Rows of one window."""
+        """Rows of one window, whose times say nothing."""
         if self._ring is not None:
             self._ring.add_table(part)
         if self._values is None:
             return
         self._values.hear(int(part.frames.length.sum()), len(part))
-        for value in self._values.of_rows(part):
-            yield DerivedMessage(value.topic, value.schema, value.time, value.time, value.data, value.metadata)
-
-    def _windows(self, following: int) -> Iterator[DerivedMessage]:
-        """Windows that end before the next row does."""
-        assert self._end is not None
-        yield from self._due(self._end)
-        self._end += WINDOW
-        if following >= self._end:  # nothing was said in that one
-            yield from self._due(self._end)
-            last = _last_due(self._end - WINDOW, following)
-            if last > self._end:
-                self._end = last
-                yield from self._due(self._end)
-            self._end += WINDOW
+        yield from map(_value, self._values.of_rows(part))
 
     def _due(self, now: int) -> list[DerivedMessage]:
         if self._values is not None:
@@ -116,6 +132,11 @@ class OfflineTopics:
         return self._channels.due(now, self._nodes.take)
 
 
-def _last_due(end: int, following: int) -> int:
-    """When the last window is over that ends before the next row does, where one ends at `end`: silence is one."""
-    return end + max(0, following - end) // WINDOW * WINDOW
+def _value(value: ValueMessage) -> DerivedMessage:
+    return DerivedMessage(value.topic, value.schema, value.time, value.time, value.data, value.metadata)
+
+
+def _windows_over(end: int, following: int) -> tuple[int, ...]:
+    """When windows are over before the next row ends, where one is over at `end`; a silence is one window."""
+    last = end + (following - end) // WINDOW * WINDOW
+    return tuple(sorted({end, min(end + WINDOW, last), last}))

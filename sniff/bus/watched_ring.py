@@ -1,10 +1,12 @@
-"""A token ring's observer alone, without the judge that watches it too: fed what an engine gives."""
+"""A token ring's observer alone, without the judge that watches it too: fed what an engine gives, asked what is new."""
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from dissectors.token_ring import RingObserver, WatchesColumns
+from dissectors.token_ring import RingObserver, RingWindow, WatchesColumns
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent
 
@@ -17,6 +19,7 @@ class WatchedRing:
 
     def __init__(self, observer: RingObserver) -> None:
         self.observer = observer
+        self._ahead: deque[RingWindow] = deque()
 
     def add(self, output: Output) -> None:
         """Take rows but those of a search for settings."""
@@ -31,6 +34,19 @@ class WatchedRing:
         else:
             for output in table.outputs():
                 self.add(output)
+
+    def add_ahead(self, table: Table, stops: Sequence[tuple[int, int]]) -> bool:
+        """Take a table all at once, to be asked what is new before each of `stops` (numbers of rows, and the end of all
+        before it, ns) in their order; whether that can be."""
+        if not isinstance(self.observer, WatchesColumns):
+            return False
+        self.add_table(table)
+        self._ahead += self.observer.windows(stops)
+        return True
+
+    def window(self) -> RingWindow:
+        """What is new since this was called the last time."""
+        return self._ahead.popleft() if self._ahead else self.observer.window()
 
     def add_line_event(self, event: LineEvent) -> None:
         """Where octets were lost, what is missing says nothing."""

@@ -6,8 +6,10 @@ not say all (noise, damage, line errors, pads, messages in several frames) are k
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
@@ -45,6 +47,8 @@ TEXTS = frozenset(("kind", "error"))
 ROW_FORMS = ("i8", "i4", "i8", "i8", "u1", "u1", "u1", "i4", "i2", "i2", "u1", "u2", "i2", "i4", "i4", "?", "u2")
 TRANSACTION_FORMS = ("i8", "i2", "u2", "i8", "i8", "u1", "i8", "i8", "i8", "i8", "i8", "i4", "i8", "u2")
 
+
+_FAR = 1 << 62  # ns
 
 AT_ONCE = 4096
 """Rows made at a time."""
@@ -130,6 +134,11 @@ class Table:
             repaired[place] = isinstance(row.event, Frame) and row.event.repair is not None
         return repaired
 
+    @property
+    def latest(self) -> int:
+        """The latest end of a row, ns; long ago where there is none."""
+        return int(self.frames.end.max(initial=-_FAR))
+
     def shown(self, name: str) -> npt.NDArray[Any]:
         """What a row says of itself: "source", "destination" or "role", by the tracker where it has a place, else by
         its header."""
@@ -171,20 +180,28 @@ class Table:
 
         They share their octets with the whole.
         """
+        return next(self.parts([begin, end]))
+
+    def parts(self, stops: Sequence[int]) -> Iterator[Table]:
+        """The rows between each of some ascending places and the next, as `part` gives them."""
         closed_by = np.maximum.accumulate(np.where(self.closed_by < 0, len(self), self.closed_by))
-        of_rows = slice(*np.searchsorted(closed_by, (begin, end if end < len(self) else len(self) + 1)).tolist())
-        rows, closed_by = slice(begin, end), self.closed_by[of_rows]
-        return replace(
-            self,
-            first=self.first + begin,
-            frames=self.frames.take(rows),
-            slack=self.slack[rows],
-            is_frame=self.is_frame[rows],
-            placed=PlacementColumns(*(getattr(self.placed, one.name)[rows] for one in fields(PlacementColumns))),
-            transactions=self.transactions.take(of_rows),
-            closed_by=np.where(closed_by < 0, -1, closed_by - begin),
-            odd={place - begin: row for place, row in self.odd.items() if begin <= place < end},
-        )
+        ends = [stop if stop < len(self) else len(self) + 1 for stop in stops[1:]]
+        firsts, lasts = (np.searchsorted(closed_by, places).tolist() for places in (stops[:-1], ends))
+        odd = sorted(self.odd)
+        for (begin, end), first, last in zip(pairwise(stops), firsts, lasts, strict=True):
+            rows, of_rows = slice(begin, end), slice(first, last)
+            closed_by = self.closed_by[of_rows]
+            yield replace(
+                self,
+                first=self.first + begin,
+                frames=self.frames.take(rows),
+                slack=self.slack[rows],
+                is_frame=self.is_frame[rows],
+                placed=PlacementColumns(*(getattr(self.placed, one.name)[rows] for one in fields(PlacementColumns))),
+                transactions=self.transactions.take(of_rows),
+                closed_by=np.where(closed_by < 0, -1, closed_by - begin),
+                odd={at - begin: self.odd[at] for at in odd[bisect_left(odd, begin) : bisect_left(odd, end)]},
+            )
 
     def without(self, torn: Masks) -> Table:
         """The same rows without some of the transactions."""
