@@ -55,7 +55,7 @@ class Budget:
         self._last: dict[str, int] = {}
 
     def take(self, channel: str, now: int) -> bool:
-        """Whether a message of a channel is to be written at `now` (ns). Asking for what has no turn changes nothing."""
+        """Whether a message of a channel is to be written at `now` (ns); a refusal changes nothing."""
         left = self._left_at(now)
         if not self._has_turn(channel, now, left):
             return False

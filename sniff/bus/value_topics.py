@@ -51,6 +51,10 @@ class ValueChannels:
                 self._topics[key] = topic
         return topic
 
+    def has_room(self, topic: str) -> bool:
+        """Whether a point has a channel, or may still get one."""
+        return topic in self._schemas or len(self._schemas) < MOST_CHANNELS
+
     def message(self, sample: Sample, wanted: Callable[[str, int], bool] = lambda *_: True) -> ValueMessage | None:
         """The message of a sample; None when there is nothing to write. `wanted`: whether a topic has its turn then."""
         value = sample.value
@@ -62,15 +66,13 @@ class ValueChannels:
             return None
         schema = TEXTS if text else NUMBERS
         known = self._schemas.get(topic)
-        if known is None:
-            if len(self._schemas) >= MOST_CHANNELS:
-                return None
-            self._schemas[topic] = schema
-            self._metadata[topic] = self._describe(sample)
-        elif known != schema:
+        if known not in (None, schema) or not self.has_room(topic):
             return None  # a channel has one schema
         if not wanted(topic, sample.time):
             return None
+        if known is None:
+            self._schemas[topic] = schema
+            self._metadata[topic] = self._describe(sample)
         if value.bit:
             self._bits[topic] = value.value
         content: dict[str, object] = {"value": value.value, "raw": value.raw}

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+from hypothesis import given
+from hypothesis import strategies as st
+
 from sniff.bus.thinning import Budget, Room
 
 S = 1_000_000_000
@@ -73,3 +76,24 @@ def test_asking_ahead_changes_nothing() -> None:
             took = alone.take(channel, now)
             assert asked.take(channel, now) == took
             assert may or not took
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from("abcdef"), st.integers(0, 5 * S), st.sampled_from([None, 1.0, 2.5]))),
+    st.data(),
+)
+def test_asking_for_what_has_no_turn_changes_nothing(
+    asked: list[tuple[str, int, float | None]], data: st.DataObject
+) -> None:
+    """So it is the same whether somebody asks ahead what needs not be worked out, or takes all as it comes."""
+    one, other = Budget(2, 6), Budget(2, 6)
+    now, taken, as_well = 0, list[bool](), list[bool]()
+    for channel, later, rate in asked:
+        now += later
+        if rate is not None:
+            one.settle(now, rate)
+            other.settle(now, rate)
+        taken.append(one.take(channel, now))
+        may = not other.is_spent(now) if data.draw(st.booleans()) else other.would_take([channel], now)
+        as_well.append(may and other.take(channel, now))
+    assert taken == as_well

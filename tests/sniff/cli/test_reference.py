@@ -50,6 +50,7 @@ def test_the_same_is_said(words: str, sniff485: Callable[..., Any]) -> None:
         assert sniff485(*command) == sniff485(*command, "--reference")
 
 
+@pytest.mark.timeout(1200 if IS_SEARCH else 120)  # one searches through all of them
 @pytest.mark.parametrize(
     "words", ["convert FILE OUT -f", *(f"cut FILE -f -o OUT {cut}" for cut in CUTS), "merge FILE FILE -f -o OUT"]
 )
