@@ -123,6 +123,7 @@ def rows(files: dict[str, Path], frames: int, rounds: int) -> Iterator[Row]:
         yield _pair(f"check, {name}", least, ("check", short), peer, 1, "≥2")
     yield from _rows_of_lines(files, frames, rounds)
     yield from _rows_of_copies(files, frames, rounds)
+    yield from _rows_of_kept(files, frames, rounds)
 
 
 def _rows_of_starts(rounds: int) -> Iterator[Row]:
@@ -198,6 +199,18 @@ def _rows_of_copies(files: dict[str, Path], frames: int, rounds: int) -> Iterato
             yield replace(_pair(work, frames, command, peer, rounds), against="row by row")
         else:
             yield _pair(work, frames, command, None, rounds)
+
+
+def _rows_of_kept(files: dict[str, Path], frames: int, rounds: int) -> Iterator[Row]:
+    """Captures that hold what `redissect` found in them; against tshark, which finds it anew."""
+    for name, short in (("mstp", ""), ("mstp-damaged", ""), ("rtu", "-short"), ("rtu-damaged", "-short")):
+        kept, count = files["mstp"].with_name("kept.mcap"), min(frames, PEER_FRAMES) if short else frames
+        _cost((sys.executable, "-m", "sniff", "redissect", str(files[name + short]), "-f", "-o", str(kept)))
+        peer = ("tshark", "-n", "-r", str(files[f"{name}.pcap"]))
+        counting = (*peer, "-q", "-z", "io,stat,0")
+        yield _pair(f"info, {name}, kept", count, ("info", str(kept)), counting, rounds, "≥5")
+        yield _pair(f"check, {name}, kept", count, ("check", str(kept)), counting, rounds, "≥2")
+        yield _pair(f"show, {name}, kept", count, ("show", str(kept)), peer, rounds, "≥4")
 
 
 def _pair(
