@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import BinaryIO
 
@@ -33,8 +33,7 @@ class MessagePass:
     """`since`: chunks that end before that time (ns) are not read. `start`: offset of the chunk to begin with, None
     for the beginning of the file.
 
-    `known`: the topics of the first channels. `only`: where the chunks begin that are read, the others holding nothing
-    of the bus.
+    `known`: the topics of the first channels. `only`: see `scan.records`.
 
     `last`: time of the last chunk read from the bus that was found. `jumped`: set when a chunk of the file was not
     read because of `since`.
@@ -47,12 +46,11 @@ class MessagePass:
         since: int | None = None,
         start: int | None = None,
         known: Sequence[str] = (RAW, LINE),
-        only: Container[int] | None = None,
+        only: Sequence[int] = (),
     ) -> None:
         self.report = report
         self.last: int | None = None
         self.jumped = False
-        self._is_jump = only is None
         self._records = scan.records(stream, report, since, start, only)
         self._schemas: dict[int, tuple[str, bytes]] = {}
         # known before the file says so: the chunk that says so may be damaged
@@ -67,7 +65,7 @@ class MessagePass:
         """What holds messages: unpacked chunks, and records by opcode that stand alone, in the order of the file."""
         for record in self._records:
             if record.body is None:
-                self.jumped = self.jumped or (self._is_jump and record.opcode == scan.CHUNK)
+                self.jumped = self.jumped or record.opcode == scan.CHUNK
             elif record.opcode != scan.CHUNK:
                 yield record.opcode, record.body
             else:

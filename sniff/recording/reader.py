@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
@@ -85,7 +85,7 @@ class McapCapture:
         self._known_first = False
         self._completeness: Completeness | None = None
         self._index = scan.ChunkIndex()
-        self._only: Container[int] | None = None
+        self._only: Sequence[int] = ()
         try:
             self._read_start()
             own = topics_of([session.bus for session in self.sessions] or [""])
@@ -198,10 +198,11 @@ class McapCapture:
 
     # what else is in the file
 
-    def only(self, chunks: Container[int]) -> McapCapture:
-        """The same, read from the chunks that begin at these octets of the file; the others hold nothing of it."""
+    def only(self, places: Sequence[int]) -> McapCapture:
+        """The same, read from the chunks that begin at these octets of the file (`scan.records`); the others hold
+        nothing of it."""
         other = copy(self)
-        other._only = chunks
+        other._only = places
         return other
 
     def know_from(self, other: McapCapture) -> None:

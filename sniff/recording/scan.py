@@ -14,7 +14,7 @@ import struct
 import zlib
 from array import array
 from bisect import bisect_left
-from collections.abc import Container, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
 from typing import BinaryIO, TypeVar
@@ -37,8 +37,6 @@ _CHUNK_START = _CHUNK.size + 32  # octets that hold all of a chunk's sizes, its 
 _ZSTD = b"\x04\x00\x00\x00zstd"
 _ZSTD_AT = _RECORD.size + 28  # of that in a chunk record
 _BLOCK = 1 << 20
-ALWAYS = 1 << 64
-"""ns; after every chunk."""
 
 
 class ChunkIndex:
@@ -71,7 +69,6 @@ class Report:
     size: int
     end: int = 0
     footer: bool = False
-    checked: bool = False  # against the check over the whole file, which agrees
     problems: list[str] = field(default_factory=list)  # in words, the first of them
     places: int = 0  # how many there are
     skipped: int = 0  # octets before `end` that could not be read
@@ -99,17 +96,18 @@ def records(
     report: Report,
     since: int | None = None,
     start: int | None = None,
-    only: Container[int] | None = None,
+    only: Sequence[int] = (),
 ) -> Iterator[Record]:
     """The records of a file, from its beginning or from a chunk at `start`.
 
     `since`: chunks whose messages all are earlier (ns) are passed over without being read; the check over the whole
-    file is then not made. `only`: the same for chunks that do not begin at one of these octets.
+    file is then not made. `only`: of a file that is known to be whole, where the chunks begin that are read, ascending,
+    and last where its data end; nothing that stands between them is given.
     """
     position = len(MAGIC) if start is None else start
     stream.seek(position)
     check = zlib.crc32(MAGIC)
-    whole = since is None and start is None
+    whole = since is None and start is None and not only
     anchor = position  # after the last chunk whose sizes agree: what lies beyond may have been misread
     while True:
         head = stream.read(_RECORD.size)
@@ -134,8 +132,11 @@ def records(
             report.end = position
             _end_of_data(stream, length, check if whole else None, report)
             return
-        skipped = only is not None and opcode == CHUNK and position not in only
-        body, last_time = _body(stream, opcode, length, ALWAYS if skipped else since)
+        if only and opcode == CHUNK and (place := _next_place(only, position)) != position:
+            position = place
+            stream.seek(position)
+            continue
+        body, last_time = _body(stream, opcode, length, since)
         whole = whole and body is not None
         if whole and body is not None:
             check = zlib.crc32(body, zlib.crc32(head, check))
@@ -145,6 +146,14 @@ def records(
         if last_time is not None:
             report.chunks.add(record_at, last_time)
             anchor = position
+        if only and opcode == CHUNK:  # on to the next, past the indices of what is in this one
+            position = _next_place(only, position)
+            stream.seek(position)
+
+
+def _next_place(places: Sequence[int], position: int) -> int:
+    """The first at or after a position; the last behind all of them."""
+    return places[min(bisect_left(places, position), len(places) - 1)]
 
 
 def _body(stream: BinaryIO, opcode: int, length: int, since: int | None) -> tuple[bytes | None, int | None]:
@@ -172,8 +181,6 @@ def _end_of_data(stream: BinaryIO, length: int, check: int | None, report: Repor
         report.problem("the index at the end is damaged")
     elif check is not None and told not in (bytes(4), struct.pack("<I", check)):
         report.problem("the check over the whole file fails: some octet has changed")
-    else:
-        report.checked = check is not None and told != bytes(4)
     _summary(stream, report)
 
 

@@ -7,12 +7,11 @@ says which octets it was made of. What contradicts all that was made to deceive,
 
 from __future__ import annotations
 
-import struct
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,18 +19,15 @@ from dissectors import registry
 from dissectors.columns import Octets
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import LineEvent, Session
-from sniff.formats.files import explain, open_capture
-from sniff.recording import scan
+from sniff.formats.files import explain
 from sniff.recording.frames import SCHEMA, VERSION, StoredTable
 from sniff.recording.program import program
 from sniff.recording.topics import FRAMES, FRAMES_RECORD, LINE, RAW
+from sniff.recording.whole_file import WholeFile, whole_file
 
 if TYPE_CHECKING:
     from sniff.engine.table import Table
     from sniff.recording.reader import McapCapture
-
-_FOOTER = struct.Struct("<BQQQI")  # opcode, length, start of the summary, of its offsets, check
-_CHUNK_INDEX, _METADATA_INDEX = 0x08, 0x0D
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,69 +64,13 @@ def stored_tables(capture: McapCapture, session: Session) -> Iterator[Table | Li
     if not is_kept(session) or len(capture.sessions) > 1:
         return None
     try:
-        found = _found_in(capture.path)
+        found = whole_file(capture.path, FRAMES_RECORD)
     except OSError as error:
         raise explain(capture.path, error) from None
     counted = None if found is None else _counted(found.record)
     if found is None or counted is None or found.record != record_of(session, counted):
         return None
-    return _tables(capture, session.protocol, counted, found.chunks)
-
-
-@dataclass(frozen=True, slots=True)
-class _Found:
-    """What a file says of its /frames: the record, and where the chunks begin that hold each topic."""
-
-    record: Mapping[str, str]
-    chunks: Mapping[str, frozenset[int]]
-
-
-def _found_in(path: Path) -> _Found | None:
-    """What a file says that is as it was written; None where it says nothing, or where it is not. Raises OSError."""
-    from mcap.records import Metadata
-
-    with open_capture(path) as stream:
-        report = scan.Report(stream.seek(0, 2))
-        summary = _summary(stream, report.size)
-        name = FRAMES_RECORD.encode()
-        if not any(opcode == _METADATA_INDEX and body.endswith(name) for opcode, body in scan.inner_records(summary)):
-            return None  # most files: they need not be read to know it
-        told: Mapping[str, str] | None = None
-        for record in scan.records(stream, report):
-            if record.opcode == scan.METADATA and record.body is not None:
-                found = scan.parse(Metadata, record.body)
-                if found is not None and found.name == FRAMES_RECORD:
-                    told = found.metadata
-    if told is None or not (report.footer and report.checked) or report.places:
-        return None
-    return _Found(told, _chunks_by_topic(summary))
-
-
-def _summary(stream: BinaryIO, size: int) -> bytes:
-    """The records behind the data; nothing where there are none."""
-    at = size - _FOOTER.size - len(scan.MAGIC)
-    if at < len(scan.MAGIC):
-        return b""
-    stream.seek(at)
-    opcode, _, begin, _, _ = _FOOTER.unpack(stream.read(_FOOTER.size))
-    if opcode != scan.FOOTER or not 0 < begin <= at or at - begin > scan.MOST_RECORD:
-        return b""
-    stream.seek(begin)
-    return stream.read(at - begin)
-
-
-def _chunks_by_topic(summary: bytes) -> dict[str, frozenset[int]]:
-    from mcap.records import Channel, ChunkIndex
-
-    topics: dict[int, str] = {}
-    chunks: dict[int, list[int]] = {}
-    for opcode, body in scan.inner_records(summary):
-        if opcode == scan.CHANNEL and (channel := scan.parse(Channel, body)) is not None:
-            topics[channel.id] = channel.topic
-        elif opcode == _CHUNK_INDEX and (chunk := scan.parse(ChunkIndex, body)) is not None:
-            for number in chunk.message_index_offsets:
-                chunks.setdefault(number, []).append(chunk.chunk_start_offset)
-    return {topic: frozenset(chunks.get(number, ())) for number, topic in topics.items()}
+    return _tables(capture, session.protocol, counted, found)
 
 
 def _counted(told: Mapping[str, str]) -> StoredRecord | None:
@@ -141,12 +81,12 @@ def _counted(told: Mapping[str, str]) -> StoredRecord | None:
 
 
 def _tables(
-    capture: McapCapture, protocol: str, counted: StoredRecord, chunks: Mapping[str, frozenset[int]]
+    capture: McapCapture, protocol: str, counted: StoredRecord, found: WholeFile
 ) -> Iterator[Table | LineEvent]:
-    bus = capture.only(chunks.get(RAW, frozenset()) | chunks.get(LINE, frozenset()))
+    bus = capture.only(found.places(RAW, LINE))
     wire = _Wire(bus)
     rows = closed = events = octets = 0
-    for stored in _messages(capture.only(chunks.get(FRAMES, frozenset()))):
+    for stored in _messages(capture.only(found.places(FRAMES))):
         while stored is not None and events < stored.events:
             event = wire.event()
             if event is None:
