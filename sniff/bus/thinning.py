@@ -73,7 +73,7 @@ class Budget:
         """Whether a message of any of these channels may be written at `now` (ns). False is sure whatever is written
         until then, for that leaves less; so it may be asked ahead of time, and changes nothing."""
         left = self._left_at(now)
-        return any(self._has_turn(channel, now, left) for channel in channels)
+        return left >= 1 and any(self._has_turn(channel, now, left) for channel in channels)
 
     def is_spent(self, now: int) -> bool:
         """Whether nothing at all may be written at `now` (ns); as sure as `would_take`."""
