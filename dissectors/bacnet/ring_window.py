@@ -135,14 +135,16 @@ class _Windows:
         self.totals = {what: np.bincount(where, minlength=self.count).tolist() for what, where in at.items()}
         wasted = np.bincount(at[Happening.WASTED], noted[Happening.WASTED].value, self.count)
         self.wasted: list[int] = wasted.astype(np.int64).tolist()  # exact: sums below 2**53
-        self.counts = {
-            what: np.bincount(at[what] * ADDRESSES + noted[what].mac, minlength=self.count * ADDRESSES)
-            for what in _COUNTED
-        }
+        self.keys = {what: np.sort(at[what] * ADDRESSES + noted[what].mac) for what in _COUNTED}
         loop, use = noted[Happening.LOOP], noted[Happening.USE]
         self.loops = _Grouped(at[Happening.LOOP] * ADDRESSES + loop.mac, loop.value)
         self.all_loops = _Grouped(at[Happening.LOOP], loop.value)
         self.uses = _Grouped(at[Happening.USE] * ADDRESSES + use.mac, use.value)
+
+    def times(self, what: Happening, key: int) -> int:
+        """How often it happened in a window to a station."""
+        begin, end = self.keys[what].searchsorted([key, key + 1])
+        return int(end - begin)
 
 
 class _Grouped:
@@ -190,7 +192,7 @@ class MstpRingWindow:
         whole, key = self._whole, self._at * ADDRESSES + address
         if not 0 <= address < ADDRESSES:
             return {}
-        tokens, retries, unanswered, postponed = (int(whole.counts[what][key]) for what in _COUNTED)
+        tokens, retries, unanswered, postponed = (whole.times(what, key) for what in _COUNTED)
         if not (tokens or unanswered):
             return {}
         return {

@@ -181,7 +181,9 @@ class _Work:
         newest = places[-MOST_ASKED:]
         frames, ids = self._frames(newest), self._table.transactions.id
         for place in newest.tolist():
-            self._reader.ask(int(ids[place]), frames[int(self._request.no[place])])
+            request = frames.get(int(self._request.no[place]))
+            if request is not None:
+                self._reader.ask(int(ids[place]), request)
 
     def _carry(self) -> None:
         """Keep the good frames whose transactions have not closed, forget those that were asked for."""

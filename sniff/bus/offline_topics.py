@@ -71,6 +71,7 @@ class OfflineTopics:
             self._channels.add_table(table)
             if self._ring is not None:
                 self._ring.add_table(table)
+                self._ring.window()  # which belongs to no second
             if self._values is not None:
                 self._values.hear(int(table.frames.length.sum()), len(table))
                 yield from map(_value, self._values.of_rows(table))
@@ -116,15 +117,6 @@ class OfflineTopics:
         if self._end is not None:
             yield from self._due(self._end)
         yield from self._channels.findings()
-
-    def _part(self, part: Table) -> Iterator[DerivedMessage]:
-        """Rows of one window, whose times say nothing."""
-        if self._ring is not None:
-            self._ring.add_table(part)
-        if self._values is None:
-            return
-        self._values.hear(int(part.frames.length.sum()), len(part))
-        yield from map(_value, self._values.of_rows(part))
 
     def _due(self, now: int) -> list[DerivedMessage]:
         if self._values is not None:

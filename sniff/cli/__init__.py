@@ -42,7 +42,7 @@ COMMANDS: dict[str, str] = {
     "fleet": "a whole archive: every bus, every day, health, findings, and what changed",
     "taps": "two captures of one line at two places: what is lost or damaged between them, and on which side",
     "anonymise": "a capture without names: other addresses, no texts, right checksums",
-    "redissect": "finds frames and exchanges anew, with other settings if need be, and keeps them: read in a fraction of the time",
+    "redissect": "finds frames anew, with other settings if need be, and keeps them: read in a fraction of the time",
     "recover": "makes a whole file of one that was cut off or damaged",
     "replay": "plays a capture to a pseudo-terminal or a TCP port of this machine",
     "extcap": "lets Wireshark capture from a port through this program",

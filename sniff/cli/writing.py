@@ -137,6 +137,9 @@ def _write_blocks(
             writer.write_block(item)
             counts.reads += len(item)
             counts.octets += len(item.reads.octets)
+            for taker in takers:
+                if isinstance(taker, _Frames):
+                    taker.log.hear_many(item.reads.times)
         if engine is not None:
             table = engine.take(item)
             for taker in takers:
@@ -163,6 +166,9 @@ def _write_items(
         if isinstance(item, Chunk) and item.octets:
             counts.reads += 1
             counts.octets += len(item.octets)
+            for taker in takers:
+                if isinstance(taker, _Frames):
+                    taker.log.hear(item.time)
         if engine is not None:
             output = engine.take(item)
             for taker in takers:
@@ -217,30 +223,30 @@ class _Frames:
 
         assert isinstance(writer, McapWriter)
         self._writer = writer
-        self._log = FrameLog(session)
+        self.log = FrameLog(session)
 
     def add(self, output: Output) -> None:
-        self._log.add(output)
+        self.log.add(output)
         self._put()
 
     def add_table(self, table: Table) -> None:
-        self._log.add_table(table)
+        self.log.add_table(table)
         self._put()
 
     def add_line_event(self, event: LineEvent) -> None:
-        self._log.add_line_event(event)
+        self.log.add_line_event(event)
         self._put()
 
     def close(self) -> None:
-        self._log.close()
+        self.log.close()
         self._put()
-        if (record := self._log.record()) is not None:
+        if (record := self.log.record()) is not None:
             from sniff.recording.topics import FRAMES_RECORD
 
             self._writer.note(FRAMES_RECORD, record)
 
     def _put(self) -> None:
-        made = self._log.take()
+        made = self.log.take()
         if made:
             from sniff.recording.frames import SCHEMA
 

@@ -161,7 +161,7 @@ def _is_sane(block: Block) -> bool:
 
 
 def _of_outputs(engine: SessionEngine, outputs: list[Output]) -> Table:
-    first = next((output.rows[0].no for output in outputs if output.rows), 0)
+    first = next((output.rows[0].no for output in outputs if output.rows), engine.engine.next)
     return Table.of_outputs(engine.dissector.name, first, outputs)
 
 

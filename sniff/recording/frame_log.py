@@ -6,10 +6,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from dissectors.columns import Times
+from sniff.engine.bulk import FAR
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, Session, settings_change
 from sniff.engine.table import Table, joined
-from sniff.recording.frames import encode
+from sniff.recording.frames import StoredTable, encode, octets_of
 from sniff.recording.stored_tables import StoredRecord, is_kept, record_of
 
 AT_ONCE = 1 << 16
@@ -24,7 +26,9 @@ class FrameLog:
     ends them.
 
     `fits`: whether whoever reads it can take it for what an engine would find: not where settings are searched for or
-    change, where a plug-in dissects, and where a table is not kept. Nothing is given any more when that is known.
+    change, where a plug-in dissects, where times run backwards or are far away (then what is found depends on how
+    reads are cut into blocks), and where a table is not kept. From then on nothing is given, and no record: what was
+    given before is left in the file, and read by nobody.
     """
 
     def __init__(self, session: Session) -> None:
@@ -33,8 +37,20 @@ class FrameLog:
         self._outputs: list[Output] = []
         self._tables: list[Table] = []
         self._rows = 0  # of those that wait
+        self._heard = -FAR
         self._made: list[tuple[int, int, bytes]] = []
         self._all_rows = self._closed = self._octets = self._events = 0
+
+    def hear(self, time: int) -> None:
+        """A read came, ns; before what is found in it."""
+        self.fits = self.fits and self._heard <= time <= FAR
+        self._heard = time
+
+    def hear_many(self, times: Times) -> None:
+        """Reads came, at least one."""
+        self.fits = self.fits and bool((times[1:] >= times[:-1]).all())
+        self.hear(int(times[0]))
+        self.hear(int(times[-1]))
 
     def add(self, output: Output) -> None:
         """Rows, and what closed with them."""
@@ -95,7 +111,11 @@ class FrameLog:
         whole = joined(self._session.protocol, tables[0].first, tables)
         try:
             for table in _pieces(whole):
-                self._made.append((*_span(table), encode(table, self._events)))
+                message = encode(table, self._events)
+                if table.first != self._all_rows + 1 or not _comes_back(message, table):
+                    self.fits = False
+                    return
+                self._made.append((*_span(table), message))
                 self._all_rows += len(table)
                 self._closed += len(table.transactions)
                 self._octets += int(table.frames.length.sum())
@@ -107,6 +127,12 @@ def _pieces(table: Table) -> Iterator[Table]:
     """The table in parts of about equal length, so that none holds only what was left over."""
     count = max(1, round(len(table) / AT_ONCE))
     return table.parts([len(table) * part // count for part in range(count + 1)]) if count > 1 else iter((table,))
+
+
+def _comes_back(message: bytes, table: Table) -> bool:
+    """Whether whoever reads it will take it."""
+    stored = StoredTable.decode(message)
+    return stored is not None and stored.table(table.protocol, octets_of(table)) is not None
 
 
 def _span(table: Table) -> tuple[int, int]:

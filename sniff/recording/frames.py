@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -41,7 +41,10 @@ MOST_ROWS = 1 << 17
 """Rows of a message that is read, and transactions; more are not written."""
 
 FAR = 1 << 62
-"""ns; times beyond it are not reckoned with in columns."""
+"""What no number of a message exceeds: ns, octets, rows."""
+
+MORE_CLOSED = 1024
+"""Exchanges that close in a table beyond `MOST_OPEN` to a row: those that were open before."""
 
 _SIZE = struct.Struct("<I")
 
@@ -63,6 +66,11 @@ FORMS: dict[str, np.dtype[Any]] = {
 
 FOLLOWING = frozenset(("frames.offset", "placed.role", "placed.source", "placed.destination"))
 """Columns that are not there when they follow from others; the first never is."""
+
+MOST_OPEN = 4
+"""Exchanges to a row, at most: most rows open one or none. A table that has more is not written (`FrameLog`)."""
+
+_OPTIONAL = ("expected", "source", "destination", "function", "address", "count")
 
 _CODES = {
     "frames.check": len(CHECKS),
@@ -131,13 +139,19 @@ def encode(table: Table, events: int) -> bytes:
     return b"".join((_SIZE.pack(len(head)), head, *(np.ascontiguousarray(one).tobytes() for one in columns)))
 
 
+def octets_of(table: Table) -> Octets:
+    """Those of its rows alone, which follow one another."""
+    frames = table.frames
+    if not len(frames):
+        return table.octets[:0]
+    return table.octets[int(frames.offset[0]) : int(frames.offset[-1] + frames.length[-1])]
+
+
 def _alone(table: Table) -> Table:
     """The table with no octets but its own."""
     frames = table.frames
-    if not len(frames):
-        return replace(table, octets=table.octets[:0])
-    begin, end = int(frames.offset[0]), int(frames.offset[-1] + frames.length[-1])
-    return replace(table, octets=table.octets[begin:end], frames=replace(frames, offset=frames.offset - begin))
+    begin = int(frames.offset[0]) if len(frames) else 0
+    return replace(table, octets=octets_of(table), frames=replace(frames, offset=frames.offset - begin))
 
 
 def _described(column: PackedColumn) -> list[int | None]:
@@ -168,10 +182,15 @@ class StoredTable:
             if not all(type(number) is int and 0 <= number < FAR for number in numbers):
                 return None
             first, rows, closed, octets, check, events = numbers
-            if max(rows, closed) > MOST_ROWS or type(described["char"]) is not int or abs(described["char"]) > 2 * FAR:
+            if (
+                max(rows, closed) > MOST_ROWS
+                or closed > MOST_OPEN * rows + MORE_CLOSED
+                or type(described["char"]) is not int
+                or abs(described["char"]) > 2 * FAR
+            ):
                 return None
             columns = _columns(described["columns"], rows, closed, data, _SIZE.size + size)
-        except (ValueError, KeyError, TypeError, struct.error, RecursionError):
+        except (ValueError, KeyError, TypeError, IndexError, struct.error, RecursionError):
             return None
         return cls(first, rows, closed, octets, check, events, described, columns)
 
@@ -186,15 +205,21 @@ class StoredTable:
             shape = self.rows, self.closed, told["char"]
             odd: dict[int, Row] = {}
             table = PackedParts(protocol, self.first, *shape, octets, names, closed_names, columns, odd).table()
-            if not _is_sound(table):
+            places = [place for place, _ in told["odd"]]
+            if not all(type(place) is int and 0 <= place < self.rows for place in places):
+                return None
+            if not _is_sound(table, places):
                 return None
             for place, values in told["odd"]:
-                if type(place) is not int or not 0 <= place < self.rows:
-                    return None
                 begin = int(table.frames.offset[place])
                 own = octets[begin : begin + int(table.frames.length[place])].tobytes()
-                odd[place] = odd_rows.row_of(values, self.first + place, protocol, own)
-        except (ValueError, KeyError, TypeError, OverflowError):
+                odd[place] = row = odd_rows.row_of(values, self.first + place, protocol, own)
+                frames, event = table.frames, row.event
+                if (row.header is not None) != table.is_frame[place]:
+                    return None
+                if (event.start, event.end) != (frames.start[place], frames.end[place]):
+                    return None
+        except (ValueError, KeyError, TypeError, OverflowError, IndexError):
             return None
         return table
 
@@ -202,6 +227,8 @@ class StoredTable:
 def _columns(described: Any, rows: int, closed: int, data: bytes, at: int) -> dict[str, PackedColumn]:
     """The columns of a message. Raises ValueError, TypeError."""
     columns: dict[str, PackedColumn] = {}
+    if not isinstance(described, dict):
+        raise ValueError("columns")
     for name, (base, width, step, none, missing) in described.items():
         count, form = closed if name.startswith("closed") else rows, FORMS[name]
         for number in (base, step, none, missing):
@@ -210,6 +237,8 @@ def _columns(described: Any, rows: int, closed: int, data: bytes, at: int) -> di
         narrow: npt.NDArray[Any] | None = None
         if width:
             there = count if step is None else count - 1
+            if there < 0:
+                raise ValueError(name)
             narrow = np.frombuffer(data, _WIDTHS[width], there, at)
             at += narrow.nbytes
         columns[name] = PackedColumn(form, count, base, narrow, step, none, missing)
@@ -228,8 +257,9 @@ def _texts(values: Any) -> tuple[str, ...]:
     return texts
 
 
-def _is_sound(table: Table) -> bool:
-    """Whether no number leads whoever takes it beyond what is there."""
+def _is_sound(table: Table, odd: Sequence[int]) -> bool:
+    """Whether no number leads whoever takes it beyond what is there, and rows without octets or a header are told of
+    each by itself: a few octets of a file make no million rows."""
     frames, placed, closed, last = table.frames, table.placed, table.transactions, table.first + len(table)
     bounds: list[tuple[npt.NDArray[Any], int, int]] = [
         (frames.length, 0, len(table.octets)),
@@ -254,10 +284,6 @@ def _is_sound(table: Table) -> bool:
         bounds.append((getattr(of, column), 0, count - 1))
     if any(len(values) and (int(values.min()) < low or int(values.max()) > high) for values, low, high in bounds):
         return False
-    return int(frames.length.sum()) == len(table.octets)
-
-
-MOST_OPEN = 4
-"""Exchanges to a row, at most; it is one as a rule."""
-
-_OPTIONAL = ("expected", "source", "destination", "function", "address", "count")
+    plain = table.is_frame & (frames.length > 0)
+    plain[odd] = True
+    return bool(plain.all()) and int(frames.length.sum()) == len(table.octets)

@@ -33,7 +33,8 @@ class MessagePass:
     """`since`: chunks that end before that time (ns) are not read. `start`: offset of the chunk to begin with, None
     for the beginning of the file.
 
-    `known`: the topics of the first channels. `only`: see `scan.records`.
+    `known`: the topics of the first channels. `only`: where the chunks begin that are read, of a file that is whole
+    (`scan.records_at`).
 
     `last`: time of the last chunk read from the bus that was found. `jumped`: set when a chunk of the file was not
     read because of `since`.
@@ -51,7 +52,7 @@ class MessagePass:
         self.report = report
         self.last: int | None = None
         self.jumped = False
-        self._records = scan.records(stream, report, since, start, only)
+        self._records = scan.records_at(stream, report, only) if only else scan.records(stream, report, since, start)
         self._schemas: dict[int, tuple[str, bytes]] = {}
         # known before the file says so: the chunk that says so may be damaged
         self.channels = {number: Channel(topic) for number, topic in enumerate(known, 1)}

@@ -1,4 +1,4 @@
-"""Which program this is: its version, and a digest of all that decides what is found in octets."""
+"""Which program this is: its version, and a digest of all that decides what is found in octets, and how it is kept."""
 
 from __future__ import annotations
 
@@ -9,23 +9,27 @@ from importlib.resources.abc import Traversable
 
 from sniff.version import __version__
 
-DECIDING = ("dissectors", "sniff.engine")
-"""Packages that frame, dissect and pair."""
+DECIDING = ("dissectors", "sniff.engine", "sniff.recording")
+"""Packages that frame, dissect, pair and keep."""
 
 
 @cache
 def program() -> str:
     """Version and digest of the sources, "0.2.0 1f…"; of the version alone where there are none to read."""
-    digest = blake2b(digest_size=12)
+    digest, found = blake2b(digest_size=12), 0
     for package in DECIDING:
-        _take(files(package), package, digest)
-    return f"{__version__} {digest.hexdigest()}"
+        found += _take(files(package), package, digest)
+    return f"{__version__} {digest.hexdigest()}" if found else __version__
 
 
-def _take(folder: Traversable, name: str, digest: blake2b) -> None:
+def _take(folder: Traversable, name: str, digest: blake2b) -> int:
+    """How many sources were taken."""
+    found = 0
     for one in sorted(folder.iterdir(), key=lambda one: one.name):
         place = f"{name}/{one.name}"
         if one.is_dir() and one.name != "__pycache__":
-            _take(one, place, digest)
+            found += _take(one, place, digest)
         elif one.name.endswith(".py"):
             digest.update(place.encode() + b"\0" + one.read_bytes())
+            found += 1
+    return found

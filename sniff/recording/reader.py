@@ -199,7 +199,7 @@ class McapCapture:
     # what else is in the file
 
     def only(self, places: Sequence[int]) -> McapCapture:
-        """The same, read from the chunks that begin at these octets of the file (`scan.records`); the others hold
+        """The same, read from the chunks that begin at these octets of the file (`scan.records_at`); the others hold
         nothing of it."""
         other = copy(self)
         other._only = places

@@ -91,23 +91,16 @@ class Record:
     body: bytes | None
 
 
-def records(
-    stream: BinaryIO,
-    report: Report,
-    since: int | None = None,
-    start: int | None = None,
-    only: Sequence[int] = (),
-) -> Iterator[Record]:
+def records(stream: BinaryIO, report: Report, since: int | None = None, start: int | None = None) -> Iterator[Record]:
     """The records of a file, from its beginning or from a chunk at `start`.
 
     `since`: chunks whose messages all are earlier (ns) are passed over without being read; the check over the whole
-    file is then not made. `only`: of a file that is known to be whole, where the chunks begin that are read, ascending,
-    and last where its data end; nothing that stands between them is given.
+    file is then not made.
     """
     position = len(MAGIC) if start is None else start
     stream.seek(position)
     check = zlib.crc32(MAGIC)
-    whole = since is None and start is None and not only
+    whole = since is None and start is None
     anchor = position  # after the last chunk whose sizes agree: what lies beyond may have been misread
     while True:
         head = stream.read(_RECORD.size)
@@ -132,10 +125,6 @@ def records(
             report.end = position
             _end_of_data(stream, length, check if whole else None, report)
             return
-        if only and opcode == CHUNK and (place := _next_place(only, position)) != position:
-            position = place
-            stream.seek(position)
-            continue
         body, last_time = _body(stream, opcode, length, since)
         whole = whole and body is not None
         if whole and body is not None:
@@ -146,14 +135,26 @@ def records(
         if last_time is not None:
             report.chunks.add(record_at, last_time)
             anchor = position
-        if only and opcode == CHUNK:  # on to the next, past the indices of what is in this one
-            position = _next_place(only, position)
-            stream.seek(position)
 
 
-def _next_place(places: Sequence[int], position: int) -> int:
-    """The first at or after a position; the last behind all of them."""
-    return places[min(bisect_left(places, position), len(places) - 1)]
+def records_at(stream: BinaryIO, report: Report, places: Sequence[int]) -> Iterator[Record]:
+    """The chunks that begin at some places of a file that is known to be whole, ascending; the last place is where its
+    data end. Ends at a place where there is none."""
+    for place in places[:-1]:
+        stream.seek(place)
+        head = stream.read(_RECORD.size)
+        opcode, length = _RECORD.unpack(head) if len(head) == _RECORD.size else (0, 0)
+        if opcode != CHUNK or length > min(report.size - place - _RECORD.size, MOST_RECORD):
+            report.problem(f"no chunk at octet {place}")
+            return
+        body, last_time = _body(stream, opcode, length, None)
+        if last_time is not None:
+            report.chunks.add(place, last_time)
+        yield Record(opcode, place, body)
+    stream.seek(places[-1])
+    _, length = _RECORD.unpack(stream.read(_RECORD.size))
+    report.end = places[-1]
+    _end_of_data(stream, length, None, report)
 
 
 def _body(stream: BinaryIO, opcode: int, length: int, since: int | None) -> tuple[bytes | None, int | None]:

@@ -2,7 +2,8 @@
 
 They are taken where the record behind them says that this very program made them, for the protocol and the times that
 are asked for, and where the check over the whole file agrees: nothing was changed, lost or added since. Each table
-says which octets it was made of. What contradicts all that was made to deceive, and is an error.
+says which octets it was made of; one that contradicts them, or all that was said, is an error. Who makes a file to
+deceive, with all its checks, is believed, as with any octets that he writes: `--reference` finds everything anew.
 """
 
 from __future__ import annotations
@@ -94,7 +95,8 @@ def _tables(
             events += 1
             yield event
         table = None
-        if stored is not None and (stored.first, stored.events) == (rows + 1, events):
+        left = counted.octets - octets
+        if stored is not None and (stored.first, stored.events) == (rows + 1, events) and stored.octets <= left:
             own = wire.octets(stored.octets)
             table = None if own is None else stored.table(protocol, own)
         if table is None:

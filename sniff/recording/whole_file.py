@@ -40,7 +40,7 @@ class WholeFile:
         """Where the chunks begin that hold any of some topics, ascending, and behind them where the data end."""
         wanted = [number for number, topic in _channels(self.index) if topic in topics]
         begins = {begin for begin, channels in _chunks(self.index) if np.isin(channels, wanted).any()}
-        return (*sorted(begins), self.data_end)
+        return (*sorted(begin for begin in begins if begin < self.data_end), self.data_end)
 
 
 def whole_file(path: Path, record: str) -> WholeFile | None:
@@ -58,10 +58,9 @@ def whole_file(path: Path, record: str) -> WholeFile | None:
             return None
         stream.seek(begin)
         index = stream.read(at - begin)
-        place = _place_of(record, index)
-        if place is None:
+        place, data_end = _place_of(record, index), begin - _DATA_END.size
+        if place is None or sum(place) > data_end:
             return None  # most files: all of them need not be read to know it
-        data_end = begin - _DATA_END.size
         if zlib.crc32(footer[:-4], zlib.crc32(index)) != check or not _is_as_written(stream, data_end):
             return None
         told = _metadata(stream, *place)
@@ -82,8 +81,6 @@ def _place_of(record: str, index: bytes) -> tuple[int, int] | None:
 def _metadata(stream: BinaryIO, begin: int, length: int) -> Mapping[str, str] | None:
     from mcap.records import Metadata
 
-    if length > scan.MOST_RECORD:
-        return None
     stream.seek(begin)
     for opcode, body in scan.inner_records(stream.read(length)):
         found = scan.parse(Metadata, body) if opcode == scan.METADATA else None

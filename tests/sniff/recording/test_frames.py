@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from functools import cache
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -191,3 +194,51 @@ def test_times_of_a_damaged_file_are_not_kept() -> None:
     row = Row(1, Noise(b"ab", -(1 << 63), 1 << 62, Place.AFTER, Reason.PAD))
     with pytest.raises(ValueError, match="not kept"):
         encode(Table.of("n2", 1, [row], []), 0)
+
+
+def described(table: Table) -> dict[str, Any]:
+    octets = encode(table, 0)
+    told: dict[str, Any] = json.loads(octets[4 : 4 + int.from_bytes(octets[:4], "little")])
+    return told
+
+
+def message(told: object, columns: bytes = b"") -> bytes:
+    head = json.dumps(told).encode()
+    return len(head).to_bytes(4, "little") + head + columns
+
+
+@pytest.mark.parametrize("columns", [None, [], "frames.end", {"frames.end": []}, {"frames.end": None}])
+def test_columns_that_are_none(columns: object) -> None:
+    told = described(Table.of("n2", 1, [], []))
+    assert StoredTable.decode(message(told)) is not None
+    assert StoredTable.decode(message({**told, "columns": columns})) is None
+
+
+@pytest.mark.parametrize("width", [0, 1, 8, 3])
+def test_steps_of_nothing(width: int) -> None:
+    told = described(Table.of("n2", 1, [], []))
+    told["columns"]["frames.end"] = [0, width, 5, -1, None]
+    stored = StoredTable.decode(message(told, bytes(8)))
+    assert stored is None or stored.table("n2", np.zeros(0, np.uint8)) is None
+
+
+@pytest.mark.parametrize("is_frame", [0, 1])
+def test_few_octets_make_no_million_rows(is_frame: int) -> None:
+    told = described(Table.of("n2", 1, [], []))
+    told["columns"]["is_frame"][0] = is_frame
+    stored = StoredTable.decode(message({**told, "rows": 100_000}))
+    assert stored is None or stored.table("n2", np.zeros(0, np.uint8)) is None
+    assert StoredTable.decode(message({**told, "closed": 100_000})) is None
+
+
+def test_a_row_told_by_itself_is_that_of_its_columns() -> None:
+    row = Row(1, Noise(b"ab", 5, 9, Place.AFTER, Reason.PAD))
+    octets = np.frombuffer(b"ab", np.uint8)
+    told, columns = described(Table.of("n2", 1, [row], [])), encode(Table.of("n2", 1, [row], []), 0)
+    rest = columns[4 + int.from_bytes(columns[:4], "little") :]
+    for place, value in ((1, 6), (2, 10)):
+        odd = [[0, list(told["odd"][0][1])]]
+        odd[0][1][place] = value
+        stored = StoredTable.decode(message({**told, "odd": odd}, rest))
+        assert stored is not None
+        assert stored.table("n2", octets) is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -34,6 +35,7 @@ ROOT = Path(__file__).parents[3]
 CAPTURES = ROOT / "captures"
 OTHERS = ROOT.parent / "shared/captures"
 FAULTS = CAPTURES / "rtu-usual-faults.cap.txt"
+CHUNK_INDEX, METADATA_INDEX = 0x08, 0x0D
 LONG = 200_000
 """Octets of a capture of others that is not read here."""
 
@@ -46,11 +48,15 @@ def keep(capture: Capture, path: Path, session: Session | None = None, *, by_row
         if by_rows:
             for item in capture.items():
                 writer.write(item)
+                if isinstance(item, Chunk):
+                    log.hear(item.time)
             for given in outputs(capture.items(), session):
                 (log.add if isinstance(given, Output) else log.add_line_event)(given)  # type: ignore[arg-type]
         else:
             for part in capture.blocks():
                 (writer.write if isinstance(part, LineEvent) else writer.write_block)(part)  # type: ignore[arg-type]
+                if not isinstance(part, LineEvent):
+                    log.hear_many(part.reads.times)
                 log.add_table(engine.take(part))
                 if isinstance(part, LineEvent):
                     log.add_line_event(part)
@@ -275,6 +281,68 @@ def test_marks_beside_the_file_stand_where_they_stand_without(kept: Path) -> Non
     assert sum(isinstance(item, LineEvent) for item in marked) == 1
     rows = [item for item in marked if not isinstance(item, LineEvent)]
     assert rows == list(flat(tables(opened(kept).blocks(), capture.session)))
+
+
+def with_index(path: Path, change: Callable[[int, bytearray], None]) -> McapCapture:
+    """The file with each record of its index changed, and its checks made anew."""
+    octets = bytearray(path.read_bytes())
+    footer = len(octets) - 8 - 29
+    begin = int.from_bytes(octets[footer + 9 : footer + 17], "little")
+    at = begin
+    while at < footer:
+        end = at + 9 + int.from_bytes(octets[at + 1 : at + 9], "little")
+        body = octets[at + 9 : end]
+        change(octets[at], body)
+        octets[at + 9 : end] = body
+        at = end
+    octets[footer + 25 : footer + 29] = zlib.crc32(octets[begin : footer + 25]).to_bytes(4, "little")
+    path.write_bytes(octets)
+    return opened(path)
+
+
+@pytest.mark.parametrize("begin", [0, 9, 1 << 40, 1 << 62, (1 << 64) - 1, None])
+def test_an_index_that_points_elsewhere_ends_the_reading(kept: Path, begin: int | None) -> None:
+    def elsewhere(opcode: int, body: bytearray) -> None:
+        if opcode == CHUNK_INDEX:
+            was = int.from_bytes(body[16:24], "little")
+            body[16:24] = (was + 1 if begin is None else begin).to_bytes(8, "little")
+
+    with pytest.raises(CaptureError, match="--reference"):
+        held(with_index(kept, elsewhere))
+
+
+@pytest.mark.parametrize("begin", [0, 1 << 40, (1 << 64) - 1])
+def test_a_record_that_is_elsewhere_is_none(kept: Path, begin: int) -> None:
+    def elsewhere(opcode: int, body: bytearray) -> None:
+        if opcode == METADATA_INDEX:
+            body[:8] = begin.to_bytes(8, "little")
+
+    assert held(with_index(kept, elsewhere)) is None
+
+
+POLL = bytes.fromhex("010300000002c40b")
+STEP = 100_000_000
+
+
+@pytest.mark.parametrize("times", [(0, 2 * STEP, STEP, 3 * STEP), (1 << 61, (1 << 61) + STEP), (0, -(1 << 61) - 1)])
+def test_where_it_depends_on_how_reads_are_cut_nothing_is_kept(times: tuple[int, ...], tmp_path: Path) -> None:
+    """A clock that runs backwards, and times far away."""
+    session = read(FAULTS).session
+    for by_rows in (False, True):
+        items = [Chunk(time, POLL) for time in times]
+        assert not keep(Items(session, items), tmp_path / "kept.mcap", by_rows=by_rows)
+        (tmp_path / "kept.mcap").unlink()
+    assert keep(
+        Items(session, [Chunk(time, POLL) for time in sorted(times) if abs(time) < 1 << 61]), tmp_path / "x.mcap"
+    )
+
+
+def test_what_the_reader_would_not_take_is_not_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from sniff.recording import frames
+
+    monkeypatch.setattr(frames, "MOST_OPEN", 0)
+    assert not keep(read(FAULTS), tmp_path / "kept.mcap")
+    assert held(opened(tmp_path / "kept.mcap")) is None
 
 
 def test_the_program_is_its_version_and_what_decides() -> None:
