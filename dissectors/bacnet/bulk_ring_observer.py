@@ -6,6 +6,7 @@ means more because of what was before. So both ways give the same ring, wherever
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from dissectors.bacnet.ring_observer import MstpRingObserver
@@ -14,6 +15,7 @@ from dissectors.bacnet.ring_questions import AskedInRing
 if TYPE_CHECKING:
     from dissectors.bacnet.ring_columns import RingColumns
     from dissectors.bacnet.ring_counts import RingCounts
+    from dissectors.columns import Masks
     from dissectors.row_columns import RowColumns
 
 RUN_LEAST = 24
@@ -77,8 +79,6 @@ class BulkRingObserver(MstpRingObserver):
 
     def _before_special(self, columns: RingColumns, begin: int, end: int) -> int:
         """The first row that means more because of what was before: a search, a station that left, an answer due."""
-        from numpy import isin
-
         nodes = self._tally.nodes.items()
         searching = [mac for mac, node in nodes if node.searches or node.after_search]
         gone = [mac for mac, node in nodes if node.gone]
@@ -88,8 +88,8 @@ class BulkRingObserver(MstpRingObserver):
         end = min(end, begin + _LOOKED_AT)
         rows = slice(begin, end)
         source, destination = columns.source[rows], columns.destination[rows]
-        special = (columns.token[rows] | columns.poll[rows]) & isin(source, searching)
-        special |= columns.poll_reply[rows] & isin(source, gone)
+        special = (columns.token[rows] | columns.poll[rows]) & _among(searching)[source]
+        special |= columns.poll_reply[rows] & _among(gone)[source]
         for server, client in postponed:
             special |= columns.data[rows] & ~columns.answers[rows] & (source == server) & (destination == client)
         return begin + int(special.argmax()) if special.any() else end
@@ -118,3 +118,12 @@ class BulkRingObserver(MstpRingObserver):
         columns.turns.teach(self._turn, begin, end, frame)
         self._before, self._doubt = frame, False
         self._quiet_since, self._quiet_slack = frame.end, frame.slack
+
+
+def _among(macs: Iterable[int]) -> Masks:
+    """bool[256]: which address is one of some, to be asked for many at once."""
+    import numpy as np
+
+    among: Masks = np.zeros(256, bool)
+    among[list(macs)] = True
+    return among
