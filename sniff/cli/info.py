@@ -92,6 +92,7 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary, fo
         "file": path,
         "complete": complete.whole,
         "completeness": complete.text,
+        "kept": _kept(capture, session),
         "first": iso(summary.load.first) if summary.load.first is not None else None,
         "last": iso(summary.load.last) if summary.load.last is not None else None,
         "seconds": summary.seconds,
@@ -119,6 +120,16 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary, fo
         "nodes": [_node_as_json(node) for node in summary.nodes.present()],
         "polled_only": summary.nodes.absent(),
     }
+
+
+_KEPT = "what is found in it, by this version with these settings"
+_KEPT_OF_OTHERS = "what another version, or other settings, found in it: found anew, unless redissect keeps that"
+
+
+def _kept(capture: Capture, session: Session) -> bool | None:
+    """Whether a file that keeps what was found in it keeps what is found now; None for any other."""
+    told = getattr(capture, "stored_fit", None)
+    return None if told is None else told(session)
 
 
 def _response_times(summary: Summary) -> dict[str, float | None]:
@@ -155,6 +166,8 @@ def _print(
     adapter = session.adapter
     print(sanitized(path))
     _line("file", complete.text if complete.whole else f"CUT: {complete.text}")
+    if (fits := _kept(capture, session)) is not None:
+        _line("kept", _KEPT if fits else _KEPT_OF_OTHERS)
     if summary.load.first is None or summary.load.last is None:
         _line("content", "no octets" if not summary.searched else "only what was heard while searching for settings")
     else:

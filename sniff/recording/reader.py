@@ -224,6 +224,13 @@ class McapCapture:
 
         return stored_tables(self, session)
 
+    def stored_fit(self, session: Session) -> bool | None:
+        """Whether the tables that the file holds are what the engine would give with this session; None where it holds
+        none. Raises CaptureError."""
+        from sniff.recording.stored_tables import fit
+
+        return fit(self, session)
+
     def messages(self, prefix: str = "/") -> Iterator[tuple[str, int, bytes]]:
         """Topic, log time (ns) and data of all messages whose topic begins so, as they are in the file."""
         with self.reading() as one:

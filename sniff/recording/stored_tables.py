@@ -64,14 +64,31 @@ def stored_tables(capture: McapCapture, session: Session) -> Iterator[Table | Li
     CaptureError, then and while they are taken."""
     if not is_kept(session) or len(capture.sessions) > 1:
         return None
+    found = _found_in(capture)
+    counted = None if found is None else _counted_for(session, found)
+    return None if found is None or counted is None else _tables(capture, session.protocol, counted, found)
+
+
+def fit(capture: McapCapture, session: Session) -> bool | None:
+    """Whether the tables that a file holds are what the engine would give with this session; None where it holds none.
+    Raises CaptureError."""
+    found = _found_in(capture)
+    if found is None:
+        return None
+    return is_kept(session) and len(capture.sessions) == 1 and _counted_for(session, found) is not None
+
+
+def _found_in(capture: McapCapture) -> WholeFile | None:
     try:
-        found = whole_file(capture.path, FRAMES_RECORD)
+        return whole_file(capture.path, FRAMES_RECORD)
     except OSError as error:
         raise explain(capture.path, error) from None
-    counted = None if found is None else _counted(found.record)
-    if found is None or counted is None or found.record != record_of(session, counted):
-        return None
-    return _tables(capture, session.protocol, counted, found)
+
+
+def _counted_for(session: Session, found: WholeFile) -> StoredRecord | None:
+    """How much the file holds, if it was made by this program for such a session."""
+    counted = _counted(found.record)
+    return None if counted is None or found.record != record_of(session, counted) else counted
 
 
 def _counted(told: Mapping[str, str]) -> StoredRecord | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -48,3 +49,20 @@ def test_commands_say_of_what_is_held_what_they_find(
 
 def _with(words: str, path: Path) -> list[str]:
     return [str(path) if word == "FILE" else word for word in words.split()]
+
+
+def test_info_says_whether_what_is_kept_is_what_is_found(tmp_path: Path, sniff485: Callable[..., Any]) -> None:
+    source, path = str(CAPTURES / "rtu-usual-faults.cap.txt"), str(tmp_path / "kept.mcap")
+    assert sniff485("redissect", source, "-o", path).code == 0
+    for words, kept, line in (
+        ([source], None, None),
+        ([path], True, "  kept         what is found in it, by this version with these settings"),
+        ([path, "-s", "38400,8E1"], False, "  kept         what another version, or other settings, found in it: found "
+         "anew, unless redissect keeps that"),
+    ):  # fmt: skip
+        assert json.loads(sniff485("info", *words, "--json").out)["kept"] is kept
+        assert [one for one in sniff485("info", *words).out.splitlines() if one.startswith("  kept")] == (
+            [] if line is None else [line]
+        )
+    assert sniff485("convert", path, str(tmp_path / "other.mcap")).code == 0
+    assert json.loads(sniff485("info", str(tmp_path / "other.mcap"), "--json").out)["kept"] is None
