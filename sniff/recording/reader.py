@@ -24,11 +24,11 @@ from sniff.engine.capture import CaptureError
 from sniff.engine.session import Completeness, Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
 from sniff.formats.files import explain, open_capture
 from sniff.formats.several_buses import SeveralBuses
-from sniff.formats.text import iso
 from sniff.recording import scan
 from sniff.recording.batch import Batch
 from sniff.recording.batch_run import BatchRun, run_of
 from sniff.recording.clean_batches import CleanBatches
+from sniff.recording.completeness import completeness_of
 from sniff.recording.joiner import Joiner
 from sniff.recording.line_messages import line_event
 from sniff.recording.messages import Head, MessagePass
@@ -294,7 +294,7 @@ class McapCapture:
     def _note(self, one: MessagePass, joiner: Joiner) -> Completeness:
         """Keep what a whole pass found, and where the chunks are, for later jumps."""
         self._index = one.report.chunks
-        self._completeness = _judge(one, joiner)
+        self._completeness = completeness_of(one, joiner)
         return self._completeness
 
     # the start
@@ -399,30 +399,6 @@ def _topics(chunk: bytes) -> set[str]:
         return set()
     found = (scan.parse(Channel, body) for opcode, body in scan.inner_records(octets) if opcode == scan.CHANNEL)
     return {channel.topic for channel in found if channel is not None}
-
-
-def _judge(one: MessagePass, joiner: Joiner) -> Completeness:
-    """What a whole pass found, in words."""
-    report = one.report
-    said: list[str] = []
-    if not report.footer:
-        when = f"last chunk read at {iso(one.last)}" if one.last is not None else "no chunk in it"
-        said.append(f"cut at octet {report.end} of {report.size}, or still being written; {when}")
-        if report.size > report.end:
-            said.append(f"{report.size - report.end} octets after it lost")
-    said.extend(report.problems)
-    if report.places > len(report.problems):
-        said.append(f"{report.places - len(report.problems)} more such places")
-    if report.skipped:
-        said.append(f"{report.skipped} octets of the file passed over")
-    for count, words in (
-        (joiner.missing, "reads missing in the numbering"),
-        (joiner.backward, "batches numbered backwards"),
-        (joiner.strange, "messages on /line that belong to nothing"),
-    ):
-        if count:
-            said.append(f"{count} {words}")
-    return Completeness(not said, "; ".join(said) if said else "complete")
 
 
 def _number(text: str | None, default: int) -> int:
