@@ -51,7 +51,7 @@ NUMBERS = st.lists(SMALL, max_size=3).map(tuple)
 FRAME = st.builds(
     Frame,
     st.just("n2"),
-    OCTETS,
+    st.binary(min_size=1, max_size=20),
     TIME,
     TIME,
     st.sampled_from(Check),
@@ -166,7 +166,7 @@ def damaged(data: st.DataObject) -> tuple[bytes, Table]:
     changed = bytearray(octets)
     size = int.from_bytes(octets[:4], "little")
     for _ in range(data.draw(st.integers(1, 4))):
-        where = st.integers(0, 4 + size) | st.integers(0, len(octets) - 1)  # the description, or anywhere
+        where = st.integers(0, 3 + size) | st.integers(0, len(octets) - 1)  # the description, or anywhere
         changed[data.draw(where)] = data.draw(st.integers(0, 255) | st.sampled_from(b'0159-"[],'))
     cut = data.draw(st.just(len(octets)) | st.integers(0, len(octets)))
     return bytes(changed[:cut]), table
