@@ -5,11 +5,13 @@ recorded unless -w says where. Where output is no terminal, frames come as lines
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
 
 from dissectors import registry
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments, listening, outlets, standard_streams, targets
+from sniff.cli.interruption import until_interrupted
 from sniff.cli.live import show
 
 DEFAULT_DURATION = 10.0
@@ -52,9 +54,10 @@ def run(args: argparse.Namespace) -> int:
                 bus.tap(), plan.line, plan.protocol, "demo", targets.notes_of(devices), profiles=devices.documents
             )
             record = RecordSpec(args.write) if args.write else None
-            live = listening.start(source, record, duration, devices)
-            bus.begin()  # with the sniffer listening, so that the first words of the bus are heard
-            return show([live], args.json, args.lines, told_to)
+            with contextlib.nullcontext() if on_terminal else until_interrupted():  # from before it begins
+                live = listening.start(source, record, duration, devices)
+                bus.begin()  # with the sniffer listening, so that the first words of the bus are heard
+                return show([live], args.json, args.lines, told_to)
     except (BusFailed, OSError) as error:
         output = isinstance(error, OSError) and error.filename == standard_streams.OUTPUT
         if output or isinstance(error, BrokenPipeError):  # nothing of the bus: whoever takes our output

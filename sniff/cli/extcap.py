@@ -5,6 +5,7 @@ About → Folders → Personal Extcap path), make it executable, restart Wiresha
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
 from dataclasses import dataclass
 
@@ -115,12 +116,12 @@ def _capture(bus: _Bus, fifo: str) -> int:
 
     if not Path(fifo).exists():
         raise Failure(f"extcap: {fifo}: no such pipe; Wireshark makes it", UNREADABLE)
-    try:
-        link = CaptureLink.start([SourceSpec(bus.port, bus.line, bus.protocol, "rs485")])
-    except PortError as error:
-        raise Failure(str(error), PORT_TROUBLE) from None
     ended: Ended | None = None
-    with link, until_interrupted() as caught:
+    with until_interrupted() as caught, contextlib.ExitStack() as stack:  # from before it begins
+        try:
+            link = stack.enter_context(CaptureLink.start([SourceSpec(bus.port, bus.line, bus.protocol, "rs485")]))
+        except PortError as error:
+            raise Failure(str(error), PORT_TROUBLE) from None
         try:
             writer = live_pcapng(fifo, link.session(0))
             while ended is None and not caught:

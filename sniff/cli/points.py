@@ -23,6 +23,7 @@ from sniff.bus.offline import outputs
 from sniff.bus.row_words import iso
 from sniff.bus.sample_row import COLUMNS, sample_row, shown_value
 from sniff.cli import USAGE, Failure, arguments, filtering, tables, watching, writing
+from sniff.cli.interruption import until_interrupted
 from sniff.cli.progress import Watched
 from sniff.cli.tables import Cell
 from sniff.engine.capture import Capture
@@ -88,7 +89,8 @@ def run(args: argparse.Namespace) -> int:
     """Print the values of every capture in turn, the parts of one recording as one; or of a port."""
     port = watching.port_of(args.files)
     if port is not None:
-        return _listen(args, port)
+        with until_interrupted():  # from before it begins
+            return _listen(args, port)
     if args.parquet is None:
         return _print(args)
     if args.latest:

@@ -25,6 +25,7 @@ from sniff.analysis.wording import station_word
 from sniff.bus.offline import survey
 from sniff.bus.row_words import iso
 from sniff.cli import USAGE, Failure, arguments, filtering, tables, watching
+from sniff.cli.interruption import until_interrupted
 from sniff.cli.progress import Watched
 from sniff.cli.tables import Cell
 from sniff.editing.merging import Merged, merged_session
@@ -66,7 +67,8 @@ def run(args: argparse.Namespace) -> int:
         table, files = files[-1], files[:-1]
     port = watching.port_of(files)
     if port is not None:
-        return _listen(args, port, table)
+        with until_interrupted():  # from before it begins
+            return _listen(args, port, table)
     stray = [word for word in files if "." not in word and not Path(word).exists() and word != "-"]
     if len(files) > 1 and stray:
         hint = "; values have a command of their own: points" if "points" in stray else ""

@@ -224,6 +224,24 @@ def test_a_signal_while_it_begins_ends_it_whole(bus, tmp_path, monkeypatch, caps
     assert read(path).completeness().whole
 
 
+@pytest.mark.parametrize(
+    "words", [("points", "PORT", *LINE), ("stats", "PORT", "nodes", *LINE), ("demo", "--lines", "-w", "x.mcap")]
+)
+def test_a_signal_while_anybody_begins_to_listen_ends_it_in_order(bus, tmp_path, monkeypatch, capsys, words) -> None:
+    start = CaptureLink.start
+
+    def start_and_be_stopped(*given: object) -> CaptureLink:
+        link = start(*given)
+        os.kill(os.getpid(), signal.SIGTERM)
+        return link
+
+    monkeypatch.setattr(CaptureLink, "start", start_and_be_stopped)
+    monkeypatch.chdir(tmp_path)
+    assert main([str(bus.link) if word == "PORT" else word for word in words]) == 0
+    capsys.readouterr()
+    assert all(read(path).completeness().whole for path in tmp_path.glob("*.mcap"))
+
+
 def test_one_that_is_not_wanted_any_more_need_not_begin(bus, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(link_module, "LEFT_TO_GREET", 0.0)
     monkeypatch.setattr(CaptureLink, "_fill", lambda self, timeout: True)  # it never greets
