@@ -22,6 +22,9 @@ Numbers = Mapping[str, int | float]
 
 ADDRESSES = 256
 
+MOST = 1 << 62
+"""ns; the times of a damaged file may lie further apart."""
+
 
 class Happening(Enum):
     """What is noted, with its value."""
@@ -64,7 +67,7 @@ class RingJournal:
 
     def note(self, what: Happening, no: int, mac: int, value: int = 0) -> None:
         """It happened in a row."""
-        self._single[what].append((no, mac, value))
+        self._single[what].append((no, mac, min(max(value, 0), MOST)))
 
     def note_many(self, what: Happening, no: Times, mac: Times, value: Times | None = None) -> None:
         """It happened in each of some rows."""

@@ -29,7 +29,7 @@ from sniff.engine.bulk import tables
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.packed_table import PackedTable
-from sniff.engine.read_source import KeepsTables
+from sniff.engine.read_source import stored_tables
 from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table
 from sniff.formats.files import watched
@@ -191,7 +191,7 @@ class FileFeed:
             yield error
 
     def _tables(self, session: Session) -> Iterator[Table | LineEvent]:
-        held = self.capture.stored_tables(session) if isinstance(self.capture, KeepsTables) else None
+        held = stored_tables(self.capture, session)
         if held is None:
             yield from tables(in_pieces(self.capture.blocks(), FIRST_READS, READS), session)
             return

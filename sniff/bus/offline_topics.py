@@ -71,7 +71,8 @@ class OfflineTopics:
             self._channels.add_table(table)
             if self._ring is not None:
                 self._ring.add_table(table)
-                self._ring.window()  # which belongs to no second
+                if len(table):
+                    self._ring.window()  # times that are none belong to no second
             if self._values is not None:
                 self._values.hear(int(table.frames.length.sum()), len(table))
                 yield from map(_value, self._values.of_rows(table))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -114,7 +115,7 @@ class TableValues:
         while self._next < len(self._telling) and self._closed_by[self._next] < stop:
             at, asked = self._telling[self._next], self._stems[self._next]
             self._next += 1
-            yield from self._values.of_exchange(asked, int(self._ended[at]), lambda at=at: self._exchange(at))  # type: ignore[misc]
+            yield from self._values.of_exchange(asked, int(self._ended[at]), partial(self._exchange, at))
 
     def rest(self) -> Iterator[ValueMessage]:
         """All others; what is still open is remembered."""

@@ -14,7 +14,7 @@ from dissectors.frame import Chunk
 from sniff.bus.offline import settled_columns
 from sniff.engine.engine import Output, Row
 from sniff.engine.observer import Observer
-from sniff.engine.read_source import KeepsTables, ReadSource
+from sniff.engine.read_source import ReadSource, stored_tables
 from sniff.engine.session import Item, LineEvent, Session
 from sniff.filter import Filter
 from sniff.filter.choosing import chosen
@@ -44,7 +44,7 @@ class _Events:
 
     def stored_tables(self, session: Session) -> Iterator[Table | LineEvent] | None:
         """As the capture."""
-        held = self._capture.stored_tables(session) if isinstance(self._capture, KeepsTables) else None
+        held = stored_tables(self._capture, session)
         return None if held is None else self._noting(held)
 
     def _noting(self, items: Iterator[Given]) -> Iterator[Given]:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, TextIO, TypeVar
 
-from sniff.engine.read_source import KeepsTables, ReadSource
+from sniff.engine.read_source import ReadSource, stored_tables
 from sniff.engine.session import Item, LineEvent, Session
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Watched:
 
     def stored_tables(self, session: Session) -> Iterator[Table | LineEvent] | None:
         """What the capture holds."""
-        held = self._capture.stored_tables(session) if isinstance(self._capture, KeepsTables) else None
+        held = stored_tables(self._capture, session)
         if held is None:
             return None
         return self._told(held, lambda table: 0 if isinstance(table, LineEvent) else len(table.octets))

@@ -130,6 +130,7 @@ def _write_blocks(
 
     assert isinstance(writer, BlockWriter)
     engine = BulkEngine(session) if takers else None
+    logs = [taker.log for taker in takers if isinstance(taker, _Frames)]
     for item in blocks:
         if isinstance(item, LineEvent):
             writer.write(item)
@@ -137,9 +138,8 @@ def _write_blocks(
             writer.write_block(item)
             counts.reads += len(item)
             counts.octets += len(item.reads.octets)
-            for taker in takers:
-                if isinstance(taker, _Frames):
-                    taker.log.hear_many(item.reads.times)
+            for log in logs:
+                log.hear_many(item.reads.times)
         if engine is not None:
             table = engine.take(item)
             for taker in takers:
@@ -161,14 +161,14 @@ def _write_items(
     counts: _Counts,
 ) -> None:
     engine = engine_for(session) if takers else None
+    logs = [taker.log for taker in takers if isinstance(taker, _Frames)]
     for item in items:
         writer.write(item)
         if isinstance(item, Chunk) and item.octets:
             counts.reads += 1
             counts.octets += len(item.octets)
-            for taker in takers:
-                if isinstance(taker, _Frames):
-                    taker.log.hear(item.time)
+            for log in logs:
+                log.hear(item.time)
         if engine is not None:
             output = engine.take(item)
             for taker in takers:

@@ -25,7 +25,7 @@ from sniff.engine.framing import BulkFraming, Clean, Stretch
 from sniff.engine.gathering import gathered
 from sniff.engine.late_columns import LateColumns
 from sniff.engine.placing import Placing, RowsAhead
-from sniff.engine.read_source import KeepsTables, ReadSource
+from sniff.engine.read_source import ReadSource, stored_tables
 from sniff.engine.session import LineEvent, Session, settings_change
 from sniff.engine.table import Table, joined
 
@@ -57,7 +57,7 @@ def tables(blocks: Iterable[Block | LineEvent], session: Session) -> Iterator[Ta
 def tables_of(capture: ReadSource, session: Session) -> Iterator[Table | LineEvent]:
     """The tables of a capture: those that it holds, where they are what would be found, else found anew. Raises as
     `tables` does."""
-    held = capture.stored_tables(session) if isinstance(capture, KeepsTables) else None
+    held = stored_tables(capture, session)
     yield from tables(capture.blocks(), session) if held is None else held
 
 

@@ -32,3 +32,8 @@ class KeepsTables(Protocol):
         """What `bulk.tables` gives of its blocks with this session; None where it does not hold just that. Raises
         CaptureError, then and while they are taken."""
         ...
+
+
+def stored_tables(capture: object, session: Session) -> Iterator[Table | LineEvent] | None:
+    """What a capture holds of what would be found in it; None for one that holds none. Raises CaptureError."""
+    return capture.stored_tables(session) if isinstance(capture, KeepsTables) else None

@@ -45,6 +45,7 @@ TEXTS = frozenset(("kind", "error"))
 """Columns that are places in `names`."""
 
 ROW_FORMS = ("i8", "i4", "i8", "i8", "u1", "u1", "u1", "i4", "i2", "i2", "u1", "u2", "i2", "i4", "i4", "?", "u2")
+PLACEMENT_FORMS = ("i8", "u1", "i2", "i2")
 TRANSACTION_FORMS = ("i8", "i2", "u2", "i8", "i8", "u1", "i8", "i8", "i8", "i8", "i8", "i4", "i8", "u2")
 
 
@@ -418,7 +419,7 @@ def placement_columns(rows: Sequence[Row]) -> PlacementColumns:
         else (placed.tx, _ROLES[placed.role], _none(placed.source, 0x7FFF), _none(placed.destination, 0x7FFF))
         for row in rows
     ]
-    return PlacementColumns(**_columns(PlacementColumns, ("i8", "u1", "i2", "i2"), values))
+    return PlacementColumns(**_columns(PlacementColumns, PLACEMENT_FORMS, values))
 
 
 def transaction_columns(closed: Sequence[Transaction]) -> TransactionColumns:

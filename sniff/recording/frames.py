@@ -31,7 +31,7 @@ from dissectors.columns import (
 )
 from sniff.engine.engine import Row
 from sniff.engine.packed_table import PackedColumn, PackedParts
-from sniff.engine.table import ROW_FORMS, TRANSACTION_FORMS, Table
+from sniff.engine.table import PLACEMENT_FORMS, ROW_FORMS, TRANSACTION_FORMS, Table
 from sniff.recording import odd_rows
 from sniff.recording.topics import SchemaText
 
@@ -54,7 +54,7 @@ FORMS: dict[str, np.dtype[Any]] = {
     "is_frame": np.dtype("?"),
     **{
         f"placed.{one.name}": np.dtype(form)
-        for one, form in zip(fields(PlacementColumns), ("i8", "u1", "i2", "i2"), strict=True)
+        for one, form in zip(fields(PlacementColumns), PLACEMENT_FORMS, strict=True)
     },
     **{
         f"closed.{one.name}": np.dtype(form)

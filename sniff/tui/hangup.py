@@ -39,8 +39,10 @@ def _watch(terminal: int, done: threading.Event) -> None:
     poll.register(terminal, 0)  # nothing that may be read: POLLHUP comes unasked
     while not done.is_set():
         events = sum(event for _, event in poll.poll(LOOK))
-        if done.is_set() or events & select.POLLNVAL:  # some systems do not poll terminals
+        if done.is_set():
             return
         if events & select.POLLHUP:
             os.kill(os.getpid(), signal.SIGHUP)
             os._exit(128 + signal.SIGHUP)  # it is ignored, and there is nobody to tell anything
+        if events:  # some systems do not poll terminals, and would say so again and again
+            return

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.ring import RingEventKind, order_of
-from dissectors.bacnet.ring_window import MstpRingWindow
+from dissectors.bacnet.ring_window import Happening, MstpRingWindow, RingJournal
 from dissectors.line import Timing
 from sniff.engine.bulk import tables
 from sniff.engine.engine import Row
@@ -102,3 +102,12 @@ def test_windows_add_up_to_the_ring(name: str) -> None:
 )
 def test_the_order_is_the_longest_ring(newest: dict[int, int], order: tuple[int, ...]) -> None:
     assert order_of(newest) == order
+
+
+def test_times_further_apart_than_can_be_counted() -> None:
+    """A damaged file may say so."""
+    journal = RingJournal()
+    for no, value in enumerate((-(1 << 64), 5, 1 << 64)):
+        journal.note(Happening.LOOP, no, 3, value)
+    (window,) = journal.windows([(3, 1 << 62)], -(1 << 62))
+    assert (window.bus["loop_p50_ms"], window.bus["loop_max_ms"]) == (5 / 1_000_000, (1 << 62) / 1_000_000)
