@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -50,7 +51,14 @@ def reference_of(path: Path) -> tuple[list[Row], list[Transaction]]:
 
 
 @pytest.mark.usefixtures("by_thread")
-def test_the_thread_gives_the_rows_of_the_reference(path: Path) -> None:
+def test_the_thread_gives_the_rows_of_the_reference(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    looked, go_on = threading.Event(), FileFeed._go_on
+
+    def go_on_later(feed: FileFeed) -> None:  # else it may be ahead by the end of the first poll
+        looked.wait()
+        go_on(feed)
+
+    monkeypatch.setattr(FileFeed, "_go_on", go_on_later)
     feed = feed_of(path)
     assert feed.poll()
     begun = feed.status()
@@ -58,6 +66,7 @@ def test_the_thread_gives_the_rows_of_the_reference(path: Path) -> None:
     assert begun.reading
     assert 0 <= begun.read < 1
     assert begun.judged < 1
+    looked.set()
     shares = [begun.read]
     while feed.status().reading:
         feed.poll()
