@@ -42,7 +42,7 @@ def peek_rtu(frame: Frame) -> Header:
     """The header of an RTU frame. Total; of a damaged frame, what its first octets or its repair say."""
     if frame.repair is not None:
         return _repaired(peek_rtu(readable(frame)), frame.repair, "CRC error")
-    error = None if frame.ok else _damage(frame, "CRC error: 0x{:04X}, computed 0x{:04X}", rtu_check(frame))
+    error = None if frame.ok else _damage(frame, "CRC error", rtu_check(frame))
     return _peek(RTU_NAME, frame.octets, frame, error, frame.expected)
 
 
@@ -51,7 +51,7 @@ def peek_ascii(frame: Frame) -> Header:
     if frame.repair is not None:
         return _repaired(peek_ascii(readable(frame)), frame.repair, "LRC error")
     octets = ascii_octets(frame)
-    error = None if frame.ok else _damage(frame, "LRC error: 0x{:02X}, computed 0x{:02X}", ascii_check(frame))
+    error = None if frame.ok else _damage(frame, "LRC error", ascii_check(frame))
     if frame.check is not Check.ABSENT:
         octets += b"\0"  # one octet more makes it as long as its RTU twin: LRC and filler stand where the CRC would
     missing = 0 if frame.expected is None else (frame.expected - len(frame.octets)) // 2
@@ -220,8 +220,9 @@ _ASKED, _ANSWERED, _SHARED = (
 )
 
 
-def _damage(frame: Frame, check_words: str, check: tuple[int, int] | None) -> str:
-    """Why a frame is not good, in words."""
+def _damage(frame: Frame, wrong: str, check: tuple[int, int] | None) -> str:
+    """Why a frame is not good, in words that many frames share: its numbers are in its text. `wrong`: of a check that
+    is there."""
     there = len(frame.octets)
     if frame.damage is Damage.SHORT or frame.damage is Damage.LONG:
         least = f", {frame.expected} expected" if frame.expected is not None else ""
@@ -229,5 +230,5 @@ def _damage(frame: Frame, check_words: str, check: tuple[int, int] | None) -> st
     if frame.damage in _DAMAGE:
         return _DAMAGE[frame.damage]
     if frame.check is Check.BAD and check is not None:
-        return check_words.format(*check)
+        return wrong
     return "no check"

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from dissectors.frame import Frame, Header, Role
-from dissectors.modbus.envelope import readable_adu
+from dissectors.frame import Check, Damage, Frame, Header, Role
+from dissectors.modbus.envelope import ASCII_NAME, ascii_check, readable_adu, rtu_check
 from dissectors.modbus.functions import DIAGNOSTICS, EXCEPTION_BIT, FUNCTIONS
 from dissectors.modbus.header import NO_EXCEPTIONS, exception_name, kind_of
 from dissectors.modbus.layout import DEVICE_ID_CODES, DEVICE_ID_OBJECTS
@@ -35,7 +35,7 @@ def meant(frame: Frame, header: Header, role: Role, meaning: Meaning) -> str:
 
 def _line(frame: Frame, header: Header, role: Role, meaning: Meaning | None) -> str:
     octets = readable_adu(frame)
-    damage = f" [{header.error}]" if not header.ok and header.error else ""
+    damage = f" [{header.error}{_check_values(frame)}]" if not header.ok and header.error else ""
     if len(octets) < 2:
         return f"{_hex(octets) or 'nothing'}{damage}"
     if role in (Role.UNKNOWN, Role.EITHER):
@@ -55,6 +55,15 @@ def _line(frame: Frame, header: Header, role: Role, meaning: Meaning | None) -> 
     if header.ok and header.error and (not code & EXCEPTION_BIT or code in NO_EXCEPTIONS):
         words += f" [{header.error}]"
     return f"{unit} {arrow} {words}{damage}"
+
+
+def _check_values(frame: Frame) -> str:
+    """The check of a frame that is damaged by it alone, as it came and as it should be."""
+    if frame.damage not in (None, Damage.CHECK) or frame.check is not Check.BAD or frame.repair is not None:
+        return ""
+    is_ascii = frame.protocol == ASCII_NAME
+    check, digits = (ascii_check(frame), 2) if is_ascii else (rtu_check(frame), 4)
+    return "" if check is None else f": 0x{check[0]:0{digits}X}, computed 0x{check[1]:0{digits}X}"
 
 
 def printable(octets: bytes) -> str:

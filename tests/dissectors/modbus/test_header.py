@@ -181,7 +181,7 @@ def test_lower_case_and_parity_bits_of_ascii(frame_of):
 
 def test_a_wrong_lrc_says_so(frame_of, peek_any):
     header = peek_any(frame_of(b":010300000004B8\r\n"))
-    assert (header.ok, header.error) == (False, "LRC error: 0xB8, computed 0xF8")
+    assert (header.ok, header.error) == (False, "LRC error")
     assert header.kind == "read-holding-registers"
 
 

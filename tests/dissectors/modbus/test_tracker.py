@@ -200,7 +200,7 @@ def test_a_damaged_answer_is_not_a_timeout(bus):
     reading = bus.say(READ).damage(VALUES).exchange(READ_2, VALUES_2, pause=300).run()
     assert reading.verdicts == ["damaged-answer", "answered"]
     assert (reading.transactions[0].response, reading.transactions[0].station) == (2, 1)
-    assert reading.transactions[0].error.startswith("CRC error: 0x")
+    assert reading.transactions[0].error == "CRC error"
     assert reading.roles[1] == "response"
 
 
