@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 
-from dissectors.checksums import ends_with_crc16
 from dissectors.frame import Frame
 from dissectors.line import Timing
 from dissectors.manifest import Dissector, PacketFile, on_first_use
@@ -13,7 +12,6 @@ from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, make_ascii, make_rt
 from dissectors.modbus.fields import answer_fields, fields
 from dissectors.modbus.framing import RtuFramer
 from dissectors.modbus.header import peek_ascii, peek_rtu
-from dissectors.modbus.lengths import MIN_FRAME
 from dissectors.modbus.places import place, spans
 from dissectors.modbus.readings import asks, readings, refusal
 from dissectors.modbus.renamer import AsciiRenamer, RtuRenamer
@@ -51,6 +49,8 @@ rtu_field_types = on_first_use("dissectors.modbus.field_types:rtu_types")
 ascii_field_types = on_first_use("dissectors.modbus.field_types:ascii_types")
 reading_columns = on_first_use("dissectors.modbus.reading_columns:reading_columns")
 
+_holds_a_good_frame = on_first_use("dissectors.modbus.stretch_crc:holds_a_good_frame")
+
 _SIEVED = 40
 """Octets of which each stretch is tried: some 700 of them."""
 
@@ -67,8 +67,7 @@ def rtu_sieve(octets: bytes) -> bool:
     """Whether some octets in a row have a good CRC; of long stretches that is not asked: framing them costs less."""
     if len(octets) > _SIEVED:
         return True
-    ends = range(len(octets), MIN_FRAME - 1, -1)
-    return any(ends_with_crc16(octets[begin:end]) for end in ends for begin in range(end - MIN_FRAME + 1))
+    return bool(_holds_a_good_frame(octets))
 
 
 def ascii_bits(frame: Frame) -> float:

@@ -7,7 +7,7 @@ bounded.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 from dissectors.frame import Flaw
@@ -109,7 +109,7 @@ class Past:
                 (length, min(times + 1, _CONSTANT)) if length == len(octets) and times >= 0 else (0, -1)
             )
 
-    def note_requests(self, count: int, newest: Iterable[bytes], calls: Iterable[int]) -> None:
+    def note_requests(self, count: int, newest: Sequence[bytes], calls: Iterable[int]) -> None:
         """So many good requests of functions whose layout is known: the same as `note` of one after the other.
 
         `newest`: the last MOST_REQUESTS of them that differ, each in the order it came last. `calls`: units and
@@ -120,6 +120,8 @@ class Past:
             self._strays -= self._strays >> 6
         self._calls.update(calls)
         requests = self._requests
+        if len(newest) >= MOST_REQUESTS:  # nothing older stays
+            requests.clear()
         for octets in newest:
             requests[octets] = None
             requests.move_to_end(octets)

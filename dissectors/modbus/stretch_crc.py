@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from dissectors.modbus.lengths import MAX_FRAME
+from dissectors.modbus.lengths import MAX_FRAME, MIN_FRAME
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -88,6 +88,33 @@ class StretchCrc:
         """Which stretches end with their own CRC."""
         good: Masks = self.registers(starts, lengths) == 0
         return good
+
+
+def holds_a_good_frame(octets: bytes) -> bool:
+    """Whether any stretch of at most MAX_FRAME octets in all, as long as the shortest frame, ends with its own CRC.
+
+    All prefixes are taken as if so many octets of 0 followed that they end together; then the register over [a, b) is
+    0 where those of a and b differ by what the first register becomes behind a.
+    """
+    of_zeros, of_initial = _listed_zeros()
+    size, register, ended = len(octets), 0, [0]
+    for left, octet in zip(range(size, 0, -1), octets, strict=True):
+        register ^= of_zeros[left][octet]
+        ended.append(register)
+    behind = set()
+    for begin in range(size - MIN_FRAME, -1, -1):
+        behind.add(ended[begin + MIN_FRAME])
+        if ended[begin] ^ of_initial[size - begin] in behind:
+            return True
+    return False
+
+
+@lru_cache(maxsize=1)
+def _listed_zeros() -> tuple[list[list[int]], list[int]]:
+    """What n zeros make of each octet, and of the first register."""
+    counts = np.arange(MAX_FRAME + 1)
+    of_initial = after_zeros(np.full(len(counts), INITIAL), counts)
+    return _zeros()[0].reshape(-1, 256).tolist(), of_initial.tolist()
 
 
 def _prefixes(octets: Octets) -> Registers:

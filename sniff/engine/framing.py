@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
@@ -67,6 +68,8 @@ class BulkFraming:
         self._dissector = dissector
         self._timing = timing
         self._framer: Framer = framer if framer is not None else dissector.framer(timing)
+        remembers = isinstance(self._framer, Remembering)  # asked once: all framers of a protocol are of one kind
+        self._primed = cast(Remembering, self._framer).primed if remembers else None
         self._known = 0  # octets handed to the framer whose events were given already
         self._given = -held  # octets of the stream that are in rows; it begins with the first block
         self._base = 0  # octets of the stream before the block at work
@@ -204,8 +207,7 @@ class _Work:
         if int(columns.offset[end - 1]) + int(columns.length[end - 1]) <= fed:  # the framer has read it all already
             return None
         earlier = self._framing._framer
-        few = earlier.primed if isinstance(earlier, Remembering) else PRIMED
-        for primed in (few, MANY, end - row):
+        for primed in (self._framing._primed or PRIMED, MANY, end - row):
             first = self._with_request(row, max(row, end - primed), number == len(events))
             if first is not None and self._prime(slice(row + 1, max(row + 1, first)), slice(first, end)):
                 self._end_events()
@@ -222,7 +224,7 @@ class _Work:
         for; None where that one has gone on already."""
         columns = self._columns
         assert columns is not None
-        if not isinstance(self._framing._framer, Remembering):
+        if self._framing._primed is None:
             return first
         asked = np.flatnonzero(columns.role[row : first + 1] == _REQUEST)
         if len(asked):
@@ -248,8 +250,8 @@ class _Work:
         columns, framing = self._columns, self._framing
         assert columns is not None
         framer = framing._dissector.framer(framing._timing)
-        if isinstance(framer, Remembering):
-            framer.remember(framing._framer, columns.take(known), self._reads.octets)
+        if framing._primed is not None:
+            cast(Remembering, framer).remember(framing._framer, columns.take(known), self._reads.octets)
         lengths = columns.length[handed].tolist()
         begin = int(columns.offset[handed.start])
         stop = int(columns.offset[handed.stop - 1]) + lengths[-1]
