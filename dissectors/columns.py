@@ -370,12 +370,11 @@ class Remembering(Protocol):
 
     primed: int
 
-    def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets) -> None:
-        """Go on with the memory of an earlier framer, and with what `frames` teach, which came after what it gave.
+    def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets, begin: int, end: int) -> None:
+        """Go on with the memory of an earlier framer, and with what rows [begin, end) of `frames` teach, which came
+        after what it gave. Without rows what it waits for comes next, or a request does.
 
-        Without frames what it waits for comes next, or a request does.
-
-        `octets`: where `frames.offset` counts.
+        `frames`: of the whole block, the same object as long as it lasts. `octets`: where `frames.offset` counts.
         """
         ...
 

@@ -112,11 +112,11 @@ class AsciiFramer:
             return None
         return self._window.proves_silence(LONGEST_SILENCE + 1 if self._inside else self._t35)
 
-    def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets) -> None:
+    def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets, begin: int, end: int) -> None:
         """See `dissectors.columns.Remembering`: what stations made of their end characters stays."""
         assert isinstance(earlier, AsciiFramer)
         self._delimiters = dict(earlier._delimiters)
-        self._change = None if len(frames) else earlier._change
+        self._change = None if begin < end else earlier._change
 
     def _give(self) -> list[Event]:
         out, self._out = self._out, []

@@ -120,14 +120,14 @@ class RtuFramer:
             return None
         return self._times.proves_silence(self.hold if self._settled else self._t35)
 
-    def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets) -> None:
+    def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets, begin: int, end: int) -> None:
         """See `dissectors.columns.Remembering`."""
         from dissectors.modbus.past_columns import learn
 
         assert isinstance(earlier, RtuFramer)
         self._window.past, self._window.units = earlier._window.past, earlier._window.units
-        self._window.expected = None if len(frames) else earlier._window.expected
-        learn(self._window.past, self._window.units, frames, octets)
+        self._window.expected = None if begin < end else earlier._window.expected
+        learn(self._window.past, self._window.units, frames, octets, begin, end)
 
     # --- when to decide --------------------------------------------------------------------------------------------
 

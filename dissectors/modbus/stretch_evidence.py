@@ -335,8 +335,7 @@ class StretchEvidence:
         station.times.extend(
             [one.low[at] for at in which], [one.nominal[at] for at in which], [one.high[at] for at in which]
         )
-        for at in which[-SAMPLES:]:  # no more are kept
-            learnt.answered(took.unit, READ, one.nominal[at])
+        learnt.answered_often(took.unit, READ, [one.nominal[at] for at in which[-SAMPLES:]])  # no more are kept
         if learnt.timeout != self._timeout:
             self._learn_timeout()
         station.compare_with(self._limit, len(which))

@@ -93,12 +93,12 @@ class N2Framer:
             return None
         return self._window.proves_silence(self._limit if self._holds_frame() else self._near)
 
-    def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets) -> None:
+    def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets, begin: int, end: int) -> None:
         """See `dissectors.columns.Remembering`: a bus that has proved to speak N2 still does."""
         from dissectors.columns import CHECKS  # who feeds row by row needs no numpy
 
         assert isinstance(earlier, N2Framer)
-        self._proved = earlier._proved or bool((frames.check == CHECKS.index(Check.GOOD)).any())
+        self._proved = earlier._proved or bool((frames.check[begin:end] == CHECKS.index(Check.GOOD)).any())
 
     @property
     def _last_place(self) -> Place:

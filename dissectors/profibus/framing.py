@@ -59,11 +59,12 @@ class ProfibusFramer(PlainFramer):
         self._is_proved = False  # a checked telegram was seen
         self._at = 0  # where the search goes on: nothing begins before it
 
-    def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets) -> None:
+    def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets, begin: int, end: int) -> None:
         """See `dissectors.columns.Remembering`."""
         from dissectors.profibus.header_columns import masters_shown
 
         assert isinstance(earlier, ProfibusFramer)
+        frames = frames.take(slice(begin, end))
         self._masters = earlier._masters | masters_shown(frames)
         self._is_proved = earlier._is_proved or bool((frames.length > FIXED[SD4]).any())
         self._is_open, self._asked, self._holder = earlier._is_open, earlier._asked, earlier._holder

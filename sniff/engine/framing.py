@@ -251,7 +251,7 @@ class _Work:
         assert columns is not None
         framer = framing._dissector.framer(framing._timing)
         if framing._primed is not None:
-            cast(Remembering, framer).remember(framing._framer, columns.take(known), self._reads.octets)
+            cast(Remembering, framer).remember(framing._framer, columns, self._reads.octets, known.start, known.stop)
         lengths = columns.length[handed].tolist()
         begin = int(columns.offset[handed.start])
         stop = int(columns.offset[handed.stop - 1]) + lengths[-1]

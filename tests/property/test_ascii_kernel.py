@@ -78,7 +78,7 @@ def test_what_a_station_made_of_its_end_character_stays() -> None:
     earlier, later = AsciiFramer(EXACT), AsciiFramer(EXACT)
     for number in (1, 2):
         earlier.feed(Chunk(number * 10**9, change))
-    later.remember(earlier, kernel(reads_of([]), EXACT), reads_of([]).octets)
+    later.remember(earlier, kernel(reads_of([]), EXACT), reads_of([]).octets, 0, 0)
     answer = seal_ascii(bytes.fromhex("010302000A"))[:-1] + b"A"
     assert later.feed(Chunk(3 * 10**9, answer)) == earlier.feed(Chunk(3 * 10**9, answer)) != []
 

@@ -19,7 +19,7 @@ def test_the_same_requests_are_remembered() -> None:
     for octets, is_answer in zip(said, answers, strict=True):
         one_by_one.note(octets, request=not is_answer)
     for begin, end in ((0, 5), (5, 3000), (3000, 3001), (3001, len(frames))):
-        learn(at_once, set(), frames.take(slice(begin, end)), reads.octets)
+        learn(at_once, set(), frames, reads.octets, begin, end)
     remembered = {octets for octets in said if one_by_one.has_asked(octets)}
     assert 0 < len(remembered) < len(set(said)) // 2
     assert {octets for octets in said if at_once.has_asked(octets)} == remembered
