@@ -182,11 +182,12 @@ class Prompt(Vertical):
             return
         self._is_answered = True
         self.post_message(self.Answered(self.purpose, event.value))
-        self.call_after_refresh(self._close_answered)  # which lays out the whole screen: the answer is painted first
+        self.post_message(self.Closed())  # the keys go back at once
+        self.call_after_refresh(self._hide_answered)  # which lays out the whole screen: the answer is painted first
 
-    def _close_answered(self) -> None:
+    def _hide_answered(self) -> None:
         if self._is_answered:  # else something else is asked for by now
-            self._close()
+            self.remove_class("open")
 
     def action_cancel(self) -> None:
         """Leave without an answer."""
