@@ -30,7 +30,7 @@ class Heard:
     """What was on the line. `octets`, and those `in_frames` that are good; `rows`, and the `good` frames among them.
 
     `outside`: rows were heard that say nothing of the bus, during a search for settings. `is_told`: it is known what
-    the octets are that are no frames.
+    the octets are that are no frames. `lacks_bits`: no octet has its upper bits, and so frames are damaged.
     """
 
     octets: int = 0
@@ -39,6 +39,7 @@ class Heard:
     good: int = 0
     outside: bool = False
     is_told: bool = False
+    lacks_bits: bool = False
 
     def merge(self, later: Heard) -> Heard:
         """Both together."""
@@ -49,6 +50,7 @@ class Heard:
             self.good + later.good,
             self.outside or later.outside,
             self.is_told or later.is_told,
+            (self.lacks_bits or not self.rows) and (later.lacks_bits or not later.rows),
         )
 
     @property
@@ -70,7 +72,7 @@ class Heard:
     @property
     def is_rubbish(self) -> bool:
         """Whether hardly anything is a frame, so that nothing else can be judged."""
-        return self.is_strange and (self.octets >= RUBBISH_LEAST or self.is_told)
+        return self.lacks_bits or (self.is_strange and (self.octets >= RUBBISH_LEAST or self.is_told))
 
 
 @dataclass(frozen=True, slots=True)

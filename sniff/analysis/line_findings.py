@@ -19,7 +19,7 @@ from sniff.analysis.breaks import LEVELS, breaks_in
 from sniff.analysis.judgement import Heard, Judgement
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.line_use import LineUse
-from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, what_fits
+from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, lacking_bits, what_fits
 from sniff.analysis.remains import Remains
 from sniff.analysis.sender_findings import BUS, MASTER, MOST_SENDERS, WRONG, Senders
 from sniff.analysis.stray_findings import strays_found
@@ -274,7 +274,11 @@ class LineFindings:
         mended = [one for one in self._mended.values() if one[0] >= MENDED_LEAST]
         good, in_frames = (own + sum(one[at] for one in mended) for at, own in enumerate((self._good, self._in_frames)))
         heard = Heard(self._octets, in_frames, self._rows, good, bool(self._only_heard))
+        heard = replace(heard, lacks_bits=self._lacking_bits() is not None)
         return replace(heard, is_told=True) if heard.is_strange and self._other_settings() is not None else heard
+
+    def _lacking_bits(self) -> Fit | None:
+        return lacking_bits(self._sample, self._session.line, self._values, self._damaged, self._rows)
 
     def judgement(self) -> Judgement:
         """All findings so far, as a value that merges."""
@@ -336,7 +340,7 @@ class LineFindings:
         share = self._in_frames / self._octets
         how_many = "not one" if not self._in_frames else "hardly one" if share < 0.005 else f"only {share:.0%}"
         words = f"{how_many} of {self._octets} octets is part of a good frame"
-        fit = self._other_settings()
+        fit = self._other_settings() or self._lacking_bits()
         if fit is not None:
             finding = self._whole("LN003", "bus", f"{words}; {fit.seen}")
             return replace(finding, means=fit.means, next=fit.next)

@@ -57,11 +57,11 @@ _ALL = (
         "Under 3 in 10 octets, and under 3 in 10 of all frames and other stretches, are good frames; of at least 60 "
         "octets, or 40 where it is known what they are. Frames that are good but for one thing, the same three times "
         "or more, count as good: the rules of the protocol name it. Not where 20 frames or more are good, "
-        "with 1 in 10 octets in them: they prove the settings (LN204). All other rules are left out then: they would "
-        "judge rubbish. What fits is named: another protocol whose checks agree, seven bits read as "
-        "eight, data bits that the port "
-        "lacks, inverted octets, a bus that is slower (every level lasts a multiple of so many bits) or faster (the "
-        "same few octets again and again, too few for a frame).",
+        "with 1 in 10 octets in them: they prove the settings (LN204). Also where none of many different frames has an "
+        "octet above 7F, and 1 in 10 is damaged: those are good that never had one. All other rules are left out then: "
+        "they would judge rubbish. What fits is named: another protocol whose checks agree, seven bits read as eight, "
+        "data bits that the port lacks, inverted octets, a bus that is slower (every level lasts a multiple of so many "
+        "bits) or faster (the same few octets again and again, too few for a frame).",
         "wrong baud rate, wrong parity, wrong protocol, or A and B swapped",
         "the settings of the line (-s) and the protocol (-p); then A and B",
     ),

@@ -8,7 +8,7 @@ nothing does, nothing is named.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from dissectors import registry
@@ -26,6 +26,12 @@ BURSTS = 16
 
 SHORT_SILENCE, LONG_SILENCE = 4, 20
 """Characters after which a stretch ends; on a bus that is much slower there is silence within characters."""
+
+DAMAGED_LEAST, DAMAGED_OFTEN = 3, 10
+"""So many rows that are no good frame, and one in so many, where octets lack bits and some frames are good."""
+
+DIFFERENT_LEAST = 10
+"""So many different frames, each with two octets of check: chance leaves bit 7 out of all once in a million."""
 
 _TEXT = frozenset(b"\r\n\t") | frozenset(range(0x20, 0x7F))
 
@@ -106,12 +112,25 @@ def _changed(sample: Sequence[Chunk], keep: int, flip: int) -> list[Chunk]:
     return [replace(chunk, octets=chunk.octets.translate(table)) for chunk in sample]
 
 
+def lacking_bits(
+    sample: Sequence[Chunk], line: LineSettings, values: Iterable[int], damaged: int, rows: int
+) -> Fit | None:
+    """That octets lack their upper bits, which spoils most frames and leaves others good by chance; else None.
+
+    `values`: that octets had; `damaged`: how many of so many `rows` are no good frame. `sample`: the first rows.
+    """
+    if damaged < DAMAGED_LEAST or DAMAGED_OFTEN * damaged < rows or any(value > 0x7F for value in values):
+        return None
+    different = {chunk.octets for chunk in sample if len(chunk.octets) > 3}
+    return next(_by_values(sample, line), None) if len(different) >= DIFFERENT_LEAST else None
+
+
 def _by_values(sample: Sequence[Chunk], line: LineSettings) -> Iterator[Fit]:
     """Octets that never have their upper bits."""
     values: Counter[int] = Counter()
     for chunk in sample:
         values.update(chunk.octets)
-    total, top = values.total(), max(values)
+    total, top = values.total(), max(values, default=0)
     if total < 2 * LEAST_OCTETS or len(values) < 8 or top > 0x7F:
         return
     bits = 5 if top <= 0x1F else 6 if top <= 0x3F else 7

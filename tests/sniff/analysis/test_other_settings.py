@@ -10,7 +10,7 @@ import pytest
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from dissectors.modbus.envelope import seal_ascii, seal_rtu
-from sniff.analysis.other_settings import Fit, what_fits
+from sniff.analysis.other_settings import Fit, lacking_bits, what_fits
 from sniff.analysis.slower_bus import slower_by
 from sniff.simulation.collision import low_times, receive
 
@@ -112,3 +112,15 @@ def test_ringing_is_no_faster_bus(ringing: bytes) -> None:
 def test_the_bus_itself_is_not_slower() -> None:
     assert slower_by(polls(), LINE) == 0
     assert slower_by([b"\x00" * 3], LINE) == 0
+
+
+def test_octets_without_their_upper_bit_spoil_frames_and_leave_others_good() -> None:
+    line = LineSettings.parse("9600,8N1")
+    sample = [Chunk(MS * number, bytes([1, 3, number, number * 5 % 128, 9, 117])) for number in range(1, 13)]
+    values = {value for chunk in sample for value in chunk.octets}
+    told = lacking_bits(sample, line, values, damaged=4, rows=12)
+    assert told is not None
+    assert "no octet of 72 is above 7F" in told.seen
+    assert lacking_bits(sample, line, {*values, 0x80}, damaged=4, rows=12) is None
+    assert lacking_bits(sample, line, values, damaged=1, rows=12) is None  # noise
+    assert lacking_bits(sample[:4] * 3, line, values, damaged=4, rows=12) is None  # the same few frames, by chance so
