@@ -24,6 +24,7 @@ _AGAIN_KEPT, _AGAIN_LEAST = 256, 8
 _AGAIN_SOON = 150 * MS  # hardly a master repeats sooner
 _UNHEARD_LEAST = 3
 _CLOSE_KEPT = 4096
+_WORDS_KEPT = 16
 _LATE_KEPT = 4096
 
 PAUSE_MARGIN = 5
@@ -69,8 +70,9 @@ class BusRecord:
     `again`: requests that were answered when they came a second time.
     `crossed`: answers to the request before the newest, which came sooner than a turn takes.
     `asked_twice`: second answers to requests that were heard twice, one directly behind the other.
-    `malformed`: requests that contradict themselves, with the exceptions they got. `to_nobody`: reads of address 0, and
-    who answered. `cut_echoes`: requests given back in part. `octets`, `frames`: of each sender ("master", "station 3").
+    `malformed`: requests that cannot be carried out, with the exceptions they got, and how many got nothing.
+    `to_nobody`: reads of address 0, and who answered. `cut_echoes`: requests given back in part.
+    `octets`, `frames`: of each sender ("master", "station 3").
     `late_frames`: answers that came too late. `broadcast_answers`: who answered broadcasts. `pairs`: (unit asked, unit
     that answered); `repeated_elsewhere`: repeats of requests that such a pair is about, by unit asked.
     `maker_words`: unit and exception code → what the maker of the device says of it, empty where not known;
@@ -106,6 +108,7 @@ class BusRecord:
     malformed: Tally = field(default_factory=Tally)
     malformed_words: Counter[str] = field(default_factory=Counter)
     malformed_codes: Counter[int] = field(default_factory=Counter)
+    malformed_unanswered: int = 0
     to_nobody: Tally = field(default_factory=Tally)
     for_nobody: Counter[int] = field(default_factory=Counter)
     cut_echoes: Tally = field(default_factory=Tally)
@@ -184,6 +187,12 @@ class BusRecord:
         if len(silent) >= least and len({key for unit in silent for key in self.stations[unit].requests}) <= _SEARCHES:
             return sorted(silent)
         return once if len(once) >= _SCAN_LEAST else []
+
+    def cannot_be(self, why: str, time: int, *frames: int | None) -> None:
+        """Note a request that nobody can carry out, with its frames."""
+        self.malformed.add(time, *frames)
+        if len(self.malformed_words) < _WORDS_KEPT:
+            self.malformed_words[why] += 1
 
     def too_close(self, sender: str, time: int, before: int, no: int) -> None:
         """Note a frame that began too soon after the one before."""

@@ -23,6 +23,7 @@ from dissectors.modbus.functions import (
     Function,
 )
 from dissectors.modbus.layout import SUB_FUNCTIONS
+from dissectors.modbus.notation import CHECK
 from dissectors.modbus.ranges import AGREEMENTS, ANSWERED, ASKED, SHARED, Number, Range
 
 _DAMAGE = {
@@ -103,6 +104,8 @@ def _peek(protocol: str, octets: bytes, frame: Frame, error: str | None, expecte
     else:
         kind = function.name if code != 0x2B else kind_of(code, octets[2] if size > _WITH_MEI else None)
         role = _role(function, octets, size, expected)
+        if ok and _asks_for_nothing(octets, size):
+            role, expected = Role.REQUEST, size
         if role is Role.UNKNOWN and ok:
             error = f"{size} octets fit neither request nor response"
         elif ok and expected not in (None, size):
@@ -134,6 +137,12 @@ def request_fault(octets: bytes) -> str | None:
         return None
     thing = "coil" if bits == 1 else "register"
     return f"byte count {there} for {quantity} {thing}{'' if quantity == 1 else 's'}, which take {needed}"
+
+
+def _asks_for_nothing(octets: bytes, size: int) -> bool:
+    """Whether it is a request to write nothing: its byte count is 0, and nothing is there. No answer is as long."""
+    agreement = AGREEMENTS.get(octets[1])
+    return agreement is not None and size == agreement.count_at + 1 + CHECK and octets[agreement.count_at] == 0
 
 
 def _is_for_all(function: Function | None) -> bool:

@@ -16,14 +16,9 @@ from dissectors.modbus.asked import AskedRequest
 from dissectors.modbus.envelope import RTU_NAME, rtu_check
 from dissectors.modbus.functions import COPIED, EXCEPTION_BIT, FUNCTIONS, answer_length
 from dissectors.modbus.learned_timing import READ
+from dissectors.modbus.limits import ILLEGAL, beyond_limits
 from dissectors.modbus.pairing import is_answer
-from dissectors.modbus.remembered import (
-    FINAL_KEPT,
-    LOST_KEPT,
-    OPEN_KEPT,
-    SLOW_UNLEARNT,
-    slow_limit,
-)
+from dissectors.modbus.remembered import FINAL_KEPT, LOST_KEPT, OPEN_KEPT, SLOW_UNLEARNT, slow_limit
 from dissectors.modbus.response_groups import AnsweredRequest
 from dissectors.modbus.row_observer import AT_ONCE, STRAY_KEPT, RowObserver
 from dissectors.modbus.rules_bus import judge
@@ -168,6 +163,9 @@ class ModbusFindings(RowObserver):
     def _settle_unasked(self, transaction: Transaction, ended: tuple[int, int, Frame] | None) -> None:
         """An answer that fits no request: of another unit than the one asked, or of nobody's asking. `ended`: itself,
         with its station and row, where it is damaged."""
+        if transaction.of is not None and transaction.of == self.newest_for_nobody:
+            self.seen.for_nobody[transaction.station or 0] += 1
+            return
         other = self.asked.get(transaction.of) if transaction.of is not None else None
         if other is not None and transaction.station is not None and transaction.station != other.unit:
             self.elsewhere[other.no] = transaction.station
@@ -212,23 +210,22 @@ class ModbusFindings(RowObserver):
             may_be_answer = asked.is_behind_silence and asked.header.role is not Role.REQUEST
             if may_be_answer or self.silences.may_have_been_answered(asked.no):
                 return
-        if asked.fault is not None:
-            self.seen.malformed.add(transaction.start, transaction.request, transaction.response)
-            if len(self.seen.malformed_words) < _WORDS_KEPT:
-                self.seen.malformed_words[asked.fault] += 1
+        why = asked.fault
+        is_carried_out = (asked.key, asked.octets) in station.same
+        if why is None and (code in ILLEGAL or (verdict is Verdict.NO_RESPONSE and not is_carried_out)):
+            why = beyond_limits(asked.octets)
+        if why is not None:
+            self.seen.cannot_be(why, transaction.start, transaction.request, transaction.response)
+            if verdict is Verdict.NO_RESPONSE:  # a station may pass over it
+                self.seen.malformed_unanswered += 1
+                return
         request = station.request(asked.key)
         request.tries += 1
         if transaction.attempt == 1:
             request.turns += 1
             self.seen.cycles.add(asked.octets, asked.key, transaction.start)
         else:
-            after = transaction.start - station.last_start
-            if transaction.attempt == 2 and verdict in (Verdict.RETRY, Verdict.EXCEPTION):
-                self.seen.again.add(asked.unit, transaction.start, after, transaction.request, transaction.response)
-            else:
-                self.seen.again.further += 1
-            station.repeats.add(transaction.start, transaction.request)
-            station.repeats_cost += max(0, transaction.start - station.last_start)
+            self._settle_repeat(station, transaction, asked)
         station.last_start = transaction.start
         station.asked += 1
         if verdict is Verdict.NO_RESPONSE:
@@ -269,7 +266,7 @@ class ModbusFindings(RowObserver):
                 came = AnsweredRequest(transaction.response, transaction.end, transaction.latency, answer)
                 station.compare(asked.key, asked.octets, came)
         if verdict is Verdict.EXCEPTION:
-            if asked.fault is None:
+            if why is None:
                 station.exception(asked.key, code or 0).add(transaction.end, transaction.request, transaction.response)
             else:
                 self.seen.malformed_codes[code or 0] += 1
@@ -280,6 +277,19 @@ class ModbusFindings(RowObserver):
             station.unfit.add(transaction.end, transaction.request, transaction.response)
             if len(station.unfit_words) < _WORDS_KEPT:
                 station.unfit_words[transaction.error] += 1
+
+    def _settle_repeat(self, station: StationRecord, transaction: Transaction, asked: AskedRequest) -> None:
+        """A request that was sent again. What was not held against the station is no try before it."""
+        before = station.last_start
+        after = 0 if before is None else transaction.start - before
+        is_second = transaction.attempt == 2 and before is not None
+        if is_second and transaction.verdict in (Verdict.RETRY, Verdict.EXCEPTION):
+            self.seen.again.add(asked.unit, transaction.start, after, transaction.request, transaction.response)
+        else:
+            self.seen.again.further += 1
+        if before is not None:
+            station.repeats.add(transaction.start, transaction.request)
+            station.repeats_cost += max(0, after)
 
     def _is_unfit(self, transaction: Transaction, asked: AskedRequest, code: int | None, answer: bytes) -> bool:
         """Whether the answer itself is not what was asked for: damage before a good answer is none of its faults."""
@@ -312,7 +322,8 @@ class ModbusFindings(RowObserver):
             if lost.no in self.hasty:
                 self.seen.crossed.add(transaction.start, lost.no, transaction.response)
                 return
-            if waited < _NO_WAIT:
+            timeout = self.learnt.timeout
+            if waited < (_NO_WAIT if timeout is not None and timeout < 2 * AT_ONCE else AT_ONCE):
                 return
         station.late.add(transaction.start, transaction.response)
 
@@ -320,6 +331,7 @@ class ModbusFindings(RowObserver):
         """A read of address 0, and who answered it."""
         seen = self.seen
         seen.to_nobody.add(transaction.start, transaction.request, transaction.response)
+        self.newest_for_nobody = transaction.id
         if transaction.verdict in (Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION):
             seen.for_nobody[transaction.station or 0] += 1
         seen.cycles.add(asked.octets, asked.key, transaction.start)

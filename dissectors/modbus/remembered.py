@@ -55,6 +55,7 @@ class Remembered:
         self.contradictory: deque[int] = deque(maxlen=64)  # transactions whose good answer contradicts itself
         self.flaws: dict[int, Flaw] = {}  # of damaged frames, by transaction
         self.newest: int | None = None  # the transaction of the newest request
+        self.newest_for_nobody: int | None = None  # that of the newest read of address 0
         self.stray: dict[int, bytes] = {}  # octets that are no good frame, by the transaction they came in
         self.lost: dict[int, Lost] = {}  # requests without answer, by transaction
         self.begins: set[bytes] = set()  # the first octets of good requests

@@ -127,7 +127,7 @@ _ALL = (
         "(Modbus over Serial Line V1.02, 2.1).",
         "a station with a faulty protocol stack; with several, their answers collide",
         "the frames named; the device's firmware; write to each station separately",
-        explains=("MB005", "MB010", "MB301", "MB002", "MB104"),
+        explains=("MB005", "MB010", "MB301", "MB002", "MB104", "MB207"),
     ),
     Rule(
         "MB205",

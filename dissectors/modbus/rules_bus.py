@@ -153,6 +153,7 @@ def _of_requests(seen: BusRecord) -> Iterator[Finding]:
         words = f"{counted(malformed.count, 'request')} that cannot be carried out: {why}"
         refused = sum(seen.malformed_codes.values())
         words += f"; refused {times(refused)}, rightly" if refused else ""
+        words += f"; not answered {times(seen.malformed_unanswered)}" if seen.malformed_unanswered else ""
         yield malformed.found(RULES["MB016"], "master", words)
     nobody = seen.to_nobody
     if nobody.count:

@@ -176,9 +176,11 @@ ANSWER_RULES = (
         Severity.WARNING,
         "requests that contradict themselves",
         "Good frames to functions 15, 16 or 23 whose byte count is not what their quantity takes (Modbus Application "
-        "Protocol V1.1b3, 6.11, 6.12, 6.17). Exceptions in answer to them are not held against the station.",
+        "Protocol V1.1b3, 6.11, 6.12, 6.17); or requests for nothing, for more than the standard allows, beyond the "
+        "last address, or of a coil's value that is neither on nor off, answered by exception 2 or 3 or by nothing. "
+        "What comes of them is not held against the station.",
         "the master builds the request wrongly; a station can only refuse it",
-        "the data type and length of this write in the master's configuration or program",
+        "the address, data type and length of this request in the master's configuration or program",
     ),
     Rule(
         "MB017",

@@ -197,7 +197,7 @@ class StationRecord:
     repeats_cost: int = 0  # ns
     waited_for: int = 0  # of the missing, those that the master surely waited for
     waited: int = 0  # ns, that the master spent on requests that nothing followed
-    last_start: int = 0  # of its newest request
+    last_start: int | None = None  # of its newest request
     last_heard: int | None = None
     copies: int = 0  # of the answers: those that equal the request and may be its repeat
     reserved: Tally = field(default_factory=Tally)  # frames when its address is outside the standard

@@ -15,6 +15,7 @@ import numpy as np
 from dissectors.modbus.exchange_columns import SAMPLES
 from dissectors.modbus.exchanged import Exchanged
 from dissectors.modbus.learned_timing import READ
+from dissectors.modbus.limits import ILLEGAL, beyond_limits
 from dissectors.modbus.long_silences import SILENCE_LEAST
 from dissectors.modbus.regular_exchanges import REFUSED, TO_ALL, UNANSWERED
 from dissectors.modbus.remembered import BEGIN, LAST_STANDARD_UNIT, OPEN_KEPT, SLOW_UNLEARNT, slow_limit
@@ -256,9 +257,14 @@ class StretchEvidence:
 
     def _refused(self, at: int, key: Key) -> None:
         one, station = self._exchanged, self._took[self._exchanged.unit[at]].station
-        first = one.rows.first
-        tally = station.exception(key, one.octets[one.answer_begin[at] + 2])
-        tally.add(one.ended[at], first + one.request[at], first + one.last[at])
+        seen, first, code = self._judge.seen, one.rows.first, one.octets[one.answer_begin[at] + 2]
+        rows = first + one.request[at], first + one.last[at]
+        beyond = beyond_limits(one.octets[one.begin[at] : one.end[at]]) if code in ILLEGAL else None
+        if beyond is None:
+            station.exception(key, code).add(one.ended[at], *rows)
+        else:
+            seen.cannot_be(beyond, one.started[at], *rows)
+            seen.malformed_codes[code] += 1
 
     def _see_unusual(self, at: int, what: int, said: bytes) -> None:
         """A repeat, a request that nobody answers (what that means is known when the next one comes), one to all."""
