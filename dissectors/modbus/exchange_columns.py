@@ -40,8 +40,10 @@ from dissectors.frame import Check, Damage, Role
 from dissectors.line import NS_PER_S, Timing
 from dissectors.modbus.exchange import damaged_request
 from dissectors.modbus.functions import EXCEPTION_BIT, ITEMS_ASKED
+from dissectors.modbus.layout import MAX_READ_REGISTERS
 from dissectors.modbus.learned_timing import LearnedTiming
 from dissectors.modbus.length_columns import PADDING, answer_lengths, of_codes
+from dissectors.modbus.notation import CHECK, HEAD
 from dissectors.modbus.ranges import RANGES_REPEATED, SINGLE_WRITES
 from dissectors.tracker import Verdict
 
@@ -171,6 +173,7 @@ def _candidates(frames: FrameColumns, octets: Octets, damaged: bool) -> _Candida
     paired = of_codes(_PAIRED, False)[code] & fine
     copied = of_codes(SINGLE_WRITES, False)[code] & fine
     asks = paired & (frames.role == _REQUEST) & (frames.destination > 0) & (frames.error == 0)
+    asks &= ~_may_be_odd_answer(frames, octets)
     either = copied & (frames.role == _EITHER) & (frames.error == 0)
     to_all = (paired | copied) & (frames.role == TO_ALL) & (frames.error == 0)
     answers = np.zeros(count, bool)
@@ -202,6 +205,14 @@ def _candidates(frames: FrameColumns, octets: Octets, damaged: bool) -> _Candida
     first = np.flatnonzero(whole | to_all | unanswered | garbled | faulty)
     answered = whole | faulty
     return _Candidates(first, answered[first], unanswered[first], garbled[first], faulty[first])
+
+
+def _may_be_odd_answer(frames: FrameColumns, octets: Octets) -> Masks:
+    """Reads of registers that ask for more than there is and whose octets would count themselves as an answer."""
+    words = of_codes(frozenset((0x03, 0x04)), False)[frames.function] & (frames.length == _SHORT)
+    counted = octets[frames.offset + HEAD] == _SHORT - HEAD - 1 - CHECK
+    odd: Masks = words & counted & ((frames.count < 1) | (frames.count > MAX_READ_REGISTERS))
+    return odd
 
 
 def _is_told_apart(frames: FrameColumns, octets: Octets, at: Times, following: Times) -> Masks:

@@ -8,6 +8,7 @@ from dissectors.line import NS_PER_S
 from dissectors.modbus.doubts import Doubts, of_chain, of_next, of_run
 from dissectors.modbus.echoes import Echoes
 from dissectors.modbus.exchange import Exchange, Seen, answer_apart
+from dissectors.modbus.functions import FUNCTIONS
 from dissectors.modbus.learned_timing import LearnedTiming
 from dissectors.modbus.pairing import mismatch
 from dissectors.tracker import Transaction, Verdict
@@ -27,7 +28,9 @@ class Exchanges:
 
     `last`: the exchange that closed last. `answered`, `given_up`: the newest of each. `chain`: equal requests before
     the open one, whose verdicts wait for it. `closed`: by the event under way. `only`: what all frames so far say;
-    empty when they differ. `heard`: of each unit, the transaction that it answered last.
+    empty when they differ. `heard`: of each unit, the transaction that it answered last. `makers`: units with functions
+    without a layout that they have answered. `copies_come_late`: whether copies of requests given up came into the wait
+    for others; `crossed`: the newest request that one was taken to have come after.
     """
 
     def __init__(self, learnt: LearnedTiming, echoes: Echoes) -> None:
@@ -43,6 +46,9 @@ class Exchanges:
         self.chain: list[Exchange] = []
         self.heard: dict[int, int] = {}
         self.only: bytes | None = None
+        self.makers: set[tuple[int, int]] = set()
+        self.copies_come_late = False
+        self.crossed: Exchange | None = None
 
     @property
     def is_at_rest(self) -> bool:
@@ -81,6 +87,8 @@ class Exchanges:
         if request is None:
             return
         self.open, self.last = None, request
+        if request is self.crossed:  # nobody answered it: what came into the wait for it may have been the next request
+            self.copies_come_late = False
         if verdict is None:
             if request.fault:
                 verdict = Verdict.DAMAGED_REQUEST
@@ -131,8 +139,16 @@ class Exchanges:
         """The request was answered."""
         request.answered = True
         self.heard[request.unit] = request.tx
+        if request.octets[1:2] and request.octets[1] not in FUNCTIONS:
+            self.makers.add((request.unit, request.octets[1]))
         for before in self.given_up:
             before.outlives |= before.unit == request.unit and request.since <= before.tx < request.tx
+
+    def close_as_late(self, copy: Exchange, before: Exchange) -> None:
+        """The open request was none, but the late answer to one before."""
+        self.open = None
+        self.given_up.remove(before)
+        self.closed.append(answer_apart(copy.tx, copy.request, Verdict.LATE, before, None))
 
     def _close_doubt(self, request: Exchange, verdict: Verdict) -> None:
         if verdict is Verdict.ANSWERED:

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from dissectors.frame import Role
 from dissectors.modbus.exchange import Exchange, Seen
 from dissectors.modbus.functions import BROADCAST, FUNCTIONS
 from dissectors.modbus.learned_timing import READ, LearnedTiming
 
 AT_ONCE = 50_000_000
 """ns; no master repeats a request sooner, unless its timeout is known to be that short."""
+
+_INTERFACES = 0x2B
+
+
+def has_no_layout(seen: Seen) -> bool:
+    """Whether nobody knows how its function lays out request and answer: a maker's, or another interface than device
+    identification behind function 43."""
+    code = seen.header.function
+    return code not in FUNCTIONS or (code == _INTERFACES and seen.header.role is Role.EITHER)
 
 
 class Promptness:
@@ -41,7 +51,7 @@ class Promptness:
             return False
         if request.unit == BROADCAST:
             return False
-        return request.octets == seen.octets or seen.header.function not in FUNCTIONS
+        return request.octets == seen.octets or has_no_layout(seen)
 
     def is_too_soon(self, request: Exchange, seen: Seen) -> bool:
         """Whether it began before the station can have seen the end of this repeat: it answers an earlier attempt."""

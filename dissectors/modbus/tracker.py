@@ -92,6 +92,9 @@ class ModbusTracker(TrackerMemory):
 
     def _request(self, seen: Seen, sure: bool = True, fault: str | None = None) -> Placement:
         """A request: an echo of the newest one, its repeat, or another."""
+        odd = self._odd.misshapen(self._held.open, seen) if sure and self._held.open is not None else None
+        if odd is not None and self._held.open is not None:
+            return self._answer(self._held.open, seen, odd)
         if sure and self._echoes.is_of_request(self._held.open or self._held.last, seen):
             if self._echoes.usual is None:
                 self._echoes.usual = True
@@ -159,11 +162,17 @@ class ModbusTracker(TrackerMemory):
             elif late is None:
                 return self._from_elsewhere(request, seen)
             request.disturbed = True
+            if late is not None and (copied := self._odd.learn(request)) is not None:
+                self._held.close_as_late(request, copied)
         if late is not None:
             self._held.given_up.remove(late)
             return self._answer_apart(seen, Verdict.LATE, late)
         if self._is_second_answer(seen):
-            return self._answer_apart(seen, Verdict.ANSWERED_TWICE, self._held.last)
+            last = self._held.last
+            if last is not None and last.asks_nobody:  # so it asked all, and more than one answer
+                error = f"unit {seen.unit} answered a request to address 0, too"
+                return self._answer_apart(seen, Verdict.UNSOLICITED, last, error)
+            return self._answer_apart(seen, Verdict.ANSWERED_TWICE, last)
         return self._answer_apart(seen, Verdict.UNSOLICITED)
 
     def _another_function(self, request: Exchange, seen: Seen) -> Placement:
@@ -201,6 +210,12 @@ class ModbusTracker(TrackerMemory):
             request.octets[1:] == seen.octets[1:] and self._times.knows(request) and self._times.in_time(request, seen)
         ):
             return self._from_elsewhere(request, seen)
+        elif self._odd.is_by_another_function(request, seen):
+            return self._another_function(request, seen)
+        elif (late := self._odd.late(request, seen)) is not None:
+            request.disturbed = True
+            self._held.given_up.remove(late)
+            return self._answer_apart(seen, Verdict.LATE, late)
         return self._request(seen, sure=False)
 
     def _after_copy(self, request: Exchange, seen: Seen) -> Placement:

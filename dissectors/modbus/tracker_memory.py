@@ -15,6 +15,7 @@ from dissectors.modbus.exchange import Exchange, Seen
 from dissectors.modbus.exchanges import Exchanges
 from dissectors.modbus.functions import BROADCAST
 from dissectors.modbus.learned_timing import WRITE, LearnedTiming
+from dissectors.modbus.odd_answers import OddAnswers
 from dissectors.modbus.pairing import is_listen_only, is_restart
 from dissectors.modbus.promptness import Promptness
 
@@ -52,6 +53,7 @@ class TrackerMemory:
         self._times = Promptness(self.learnt, self._silence, timing.latency)
         self._echoes = Echoes(timing, self._silence, self.learnt)
         self._held = Exchanges(self.learnt, self._echoes)
+        self._odd = OddAnswers(self._times, self._held)
         self._last_end: int | None = None  # of the newest frame
         self._last_was_answer = False
         self._units: set[int] = set()  # named in good frames

@@ -1,0 +1,81 @@
+"""Answers in the shape of requests: what comes as soon as answers do, while a request waits, is none of the master's.
+
+    01 03 00 10 00 02          01 00 01              a function that nobody asks for
+    01 10 00 10 00 01 02 0007  01 06 00 10 00 07     the same address, by another function that writes
+    01 03 00 10 00 02          01 03 03 00 07 00     as a request it would ask for more than there is
+    01 06 00 05 00 01          02 03 00 00 00 01     01 06 00 05 00 01     02 03 02 00 07
+                               └ to another station  └ the late answer, and no request: 02 was still waited for
+
+A master does not ask while it waits. But where this tap missed an answer, its next request stands in the same place: so
+nothing is told of what comes later than answers do, and of late answers only where the bus has shown that they are.
+"""
+
+from __future__ import annotations
+
+from dissectors.modbus.exchange import Exchange, Seen
+from dissectors.modbus.exchanges import Exchanges
+from dissectors.modbus.functions import FUNCTIONS
+from dissectors.modbus.limits import beyond_limits
+from dissectors.modbus.notation import HEAD
+from dissectors.modbus.pairing import mismatch
+from dissectors.modbus.promptness import AT_ONCE, Promptness
+
+_ADDRESS_END = HEAD + 2
+
+
+class OddAnswers:
+    """Compares with what waits, and with what the bus has shown."""
+
+    def __init__(self, times: Promptness, held: Exchanges) -> None:
+        self._times = times
+        self._held = held
+
+    def is_by_another_function(self, request: Exchange, seen: Seen) -> bool:
+        """Whether the station that was asked answers by a function that is no master's, or by another that writes."""
+        if seen.unit != request.unit or not self._may_be_answered(request, seen):
+            return False
+        code, asked = seen.header.function, request.octets[1]
+        if code == asked:
+            return False
+        function = FUNCTIONS.get(code) if code is not None else None
+        if function is None:
+            return (request.unit, seen.octets[1]) not in self._held.makers
+        same_place = seen.octets[HEAD:_ADDRESS_END] == request.octets[HEAD:_ADDRESS_END]
+        return function.writes and FUNCTIONS[asked].writes and same_place
+
+    def misshapen(self, request: Exchange, seen: Seen) -> str | None:
+        """Why a frame is not the answer that was asked for, where it is one and looks like a request; None else."""
+        if request.unit != seen.unit or not request.is_for(seen.octets) or not self._may_be_answered(request, seen):
+            return None
+        if FUNCTIONS[request.octets[1]].writes:
+            return None
+        if seen.header.error is not None:
+            return seen.header.error
+        counted = len(seen.octets) > HEAD and len(seen.octets) == HEAD + 1 + seen.octets[HEAD]
+        return mismatch(request.octets, seen.octets) if counted and beyond_limits(seen.octets) is not None else None
+
+    def _may_be_answered(self, request: Exchange, seen: Seen) -> bool:
+        is_plain = request.sure and not (request.fault or request.garble or request.request.header.error)
+        has_layout = len(request.octets) > 1 and request.octets[1] in FUNCTIONS
+        return is_plain and has_layout and self._times.is_prompt(request, seen)
+
+    def late(self, request: Exchange, seen: Seen) -> Exchange | None:
+        """The request given up that a copy of it answers, where another one waits; None where it may be a repeat."""
+        if not (self._held.copies_come_late and request.sure) or request.gap(seen.frame.start) >= AT_ONCE:
+            return None
+        late = self._held.late_for(seen)
+        if late is None or late.octets != seen.octets or (late.waited or 0) < AT_ONCE:
+            return None
+        self._held.crossed = request
+        return late
+
+    def learn(self, between: Exchange) -> Exchange | None:
+        """The request before another one was answered after all, so that the other came into the wait for it: the one
+        given up that it answers, as a copy; None where it is no copy."""
+        if between.sure or not between.octets:
+            return None
+        copied = (one for one in reversed(self._held.given_up) if one is not between and one.octets == between.octets)
+        late = next(copied, None)
+        if late is not None:
+            self._held.copies_come_late = True
+        return late

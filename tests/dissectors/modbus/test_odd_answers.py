@@ -1,0 +1,95 @@
+"""Answers in the shape of requests, and requests that stand where an answer could."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from tests.dissectors.modbus.judged import findings_of, graves_of
+
+OTHER, OTHER_VALUES = "020300000001", "0203020007"
+READ, VALUES = "010300100002", "01030400070008"
+
+
+@pytest.fixture
+def bus(paper_bus):
+    return paper_bus()
+
+
+def well(bus, count=4):
+    for _ in range(count):
+        bus.exchange(OTHER, OTHER_VALUES).exchange(READ, VALUES)
+    return bus
+
+
+@pytest.mark.parametrize(
+    ("asked", "answer", "words"),
+    [
+        ("050300100001", "050001", "function 0x00 instead of 0x03 or 0x83"),
+        ("050300100001", "054301", "function 0x43 instead of 0x03 or 0x83"),
+        ("0510001000010200ff", "0506001000ff", "function 0x06 instead of 0x10 or 0x90"),
+        ("050300100002", "050303000700", "3 data octets for 2 registers asked for, expected 4"),
+        ("050300100002", "05030000070008", "9 octets where its own count makes it 8"),
+        ("050300100002", "0503000400070008", "10 octets where its own count makes it 8"),
+    ],
+)
+def test_an_answer_in_the_shape_of_a_request_does_not_fit(bus, asked, answer, words):
+    bus.line = "9600,8N1"
+    well(bus)
+    for _ in range(5):
+        bus.exchange(OTHER, OTHER_VALUES).exchange(asked, answer, answer=20)
+    if "own count" in words:  # the framer says how long it should have been
+        bus.events[:] = [
+            replace(one, expected=8) if one.octets[:-2] == bytes.fromhex(answer) else one for one in bus.events
+        ]
+    assert graves_of(bus) == {("MB010", "station 5")}
+    assert words in next(one.seen for one in findings_of(bus) if one.code == "MB010")
+
+
+def test_a_function_of_makers_that_is_asked_is_no_answer_to_what_was_asked_before(bus):
+    """The tap missed the answer to the read; the next request is prompt."""
+    well(bus)
+    for _ in range(4):
+        bus.exchange("01410001", "0141000100ff")
+    bus.exchange(OTHER, OTHER_VALUES).say(READ).exchange("01410001", "0141000100ff", pause=30).exchange(READ, VALUES)
+    assert bus.run().verdicts.count("no-response") == 1
+    assert graves_of(bus) == set()
+
+
+WRITE = "0306000500{:02x}"
+
+
+def late_confirmations(bus, rounds=8, answers=True):
+    """Station 3 confirms each write 10 ms into the wait for station 1, or its master repeats it there by itself."""
+    for value in range(rounds):
+        bus.exchange(OTHER, OTHER_VALUES).say(WRITE.format(value), 60).say(READ, 1000).say(WRITE.format(value), 10)
+        if answers:
+            bus.say(VALUES, 8)
+    return bus
+
+
+def test_a_late_confirmation_in_the_wait_for_another_station_is_late(bus):
+    late_confirmations(bus).exchange(OTHER, OTHER_VALUES)
+    assert graves_of(bus) == {("MB103", "station 3")}
+
+
+def test_a_dead_station_that_is_written_to_again_is_not_late(bus):
+    """The answers of station 1 are not heard here, and the master goes on at once."""
+    late_confirmations(bus, answers=False).exchange(OTHER, OTHER_VALUES, pause=1000)
+    assert ("MB103", "station 3") not in graves_of(bus)
+
+
+def test_the_second_of_two_that_answer_a_read_of_address_0_answers_not_twice(bus):
+    for value in range(6):
+        bus.exchange("000300200001", f"0a03020{value:x}07", pause=200).say(f"0c03020{value:x}07", 8)
+    assert set(bus.run().verdicts) == {"answered", "unsolicited"}
+    assert graves_of(bus) == {("MB017", "master")}
+    assert "stations 10, 12 answered" in next(one.seen for one in findings_of(bus) if one.code == "MB017")
+
+
+def test_another_interface_behind_function_43_may_take_long(bus):
+    for value in range(6):
+        bus.exchange(f"012b0d0107{value:02x}", f"012b0d0107{value:02x}0304", answer=400, pause=900)
+        bus.exchange(OTHER, OTHER_VALUES)
+    assert graves_of(bus) == set()
