@@ -12,7 +12,7 @@ same baud rate. Pure.
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from math import log2
@@ -25,6 +25,9 @@ _STRETCHES_KEPT = 32
 _DIFFERENT_KEPT = 64
 _LEAST = 3
 _CERTAIN = 24  # bits: chance makes octets that fit so well once in 16 million
+_MOST: Final = _FACTORS[0]
+_LATE_EDGE: Final = 0x80  # a bit of eight: low up to the last data bit, or up to the end
+_LONG = 6  # octets
 _STRAY = 20  # one octet in so many may not fit: an edge that jitter moved
 
 
@@ -43,10 +46,10 @@ _FITTING: Final = {factor: frozenset(o for o in range(256) if _fits(o, factor)) 
 
 def slower_by(stretches: Iterable[bytes]) -> int | None:
     """The factor by which the sender is slower than the line is set, if the octets show it; None otherwise."""
-    octets = b"".join(stretches)
-    telling = [octet for octet in octets if octet]  # a long low is 00 at any baud rate
+    each = list(stretches)
+    telling = [octet for octet in b"".join(each) if octet]  # a long low is 00 at any baud rate
     if len(set(telling)) < 2:
-        return None
+        return _MOST if set(telling) == {_LATE_EDGE} and _are_of_two_levels(each) else None
     for factor in _FACTORS:
         fitting = _FITTING[factor]
         strays = sum(octet not in fitting for octet in telling)
@@ -55,6 +58,13 @@ def slower_by(stretches: Iterable[bytes]) -> int | None:
         if (len(telling) - strays) * log2(255 / (len(fitting) - 1)) >= _CERTAIN:
             return factor
     return None
+
+
+def _are_of_two_levels(stretches: Sequence[bytes]) -> bool:
+    """Whether most are long and change between the only two octets there are where a bit outlasts a character: a
+    break has none of the one, the ringing of a driver none of the other."""
+    mixed = sum(len(one) >= _LONG and 4 * min(one.count(0), one.count(_LATE_EDGE)) >= len(one) for one in stretches)
+    return mixed >= _LEAST and 4 * mixed >= 3 * len(stretches)
 
 
 @dataclass(slots=True)

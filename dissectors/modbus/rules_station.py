@@ -163,11 +163,12 @@ def _damaged(seen: BusRecord, name: str, station: StationRecord, is_common: bool
         words += f"; that is {low:.1%} to {high:.1%} of all, with 95% confidence"
     finding = damaged.found(RULES["MB005"], name, words, note_if(rare or is_common))
     if damaged.count >= _NEARLY_ALL_LEAST and 10 * damaged.count >= 9 * station.asked:  # noise leaves some
-        finding = replace(
-            finding,
-            means=f"{finding.means}; or two stations with this address, whose answers fall on each other",
-            next=f"switch the station off and see whether something still answers; {finding.next}",
-        )
+        means = f"{finding.means}; or two stations with this address, whose answers fall on each other"
+        following = f"switch the station off and see whether something still answers; {finding.next}"
+        if not station.answered and 10 * station.garbled >= 9 * damaged.count:  # noise leaves some of it
+            means = f"the device has another baud rate, or speaks another protocol; or {means}"
+            following = f"baud rate, parity and protocol in the device's settings; {following}"
+        finding = replace(finding, means=means, next=following)
     yield finding
 
 

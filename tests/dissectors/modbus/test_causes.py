@@ -103,6 +103,19 @@ def test_runs_of_equal_bits():
     assert slower_by([SLOW]) == 4
     assert slower_by([b"\0\0\0\0\0\0\0\0"]) is None
     assert slower_by([bytes(range(64))]) is None
+    eighth = bytes.fromhex("0080000080800000")
+    assert slower_by([eighth, eighth[1:], eighth[:-1]]) == 8
+    assert slower_by([b"\0\0\0\0\0\0\0"] * 8) is None  # breaks
+    assert slower_by([b"\x80"] * 20) is None  # a driver that rings
+    assert slower_by([b"\0\x80"] * 20) is None
+
+
+def test_what_was_never_a_frame_may_be_another_baud_rate(bus):
+    for turn in range(12):
+        bus.exchange(OTHER, OTHER_VALUES)
+        bus.say(READ, 200).noise(bytes((turn * 37 + k * 59) & 0xFF for k in range(5)))
+    (finding,) = (one for one in findings_of(bus) if one.code == "MB005")
+    assert finding.means.startswith("the device has another baud rate")
 
 
 def test_an_answer_of_another_function_is_the_stations(bus):
