@@ -18,6 +18,7 @@ from itertools import pairwise
 
 from dissectors.line import NS_PER_S
 from dissectors.modbus.exchange import Exchange
+from dissectors.modbus.functions import FUNCTIONS
 from dissectors.modbus.learned_timing import READ, LearnedTiming
 from dissectors.tracker import Verdict
 
@@ -54,6 +55,8 @@ def of_next(request: Exchange, start: int, resembles: bool, learnt: LearnedTimin
     if learnt.pauses_after_timeouts(gap, pause, cycle):
         return Verdict.NO_RESPONSE
     copy = request.copies[0]
+    if copy.octets != request.octets and copy.header.function in FUNCTIONS and learnt.is_same(gap, pause):
+        return Verdict.NO_RESPONSE  # two polls of coils, and a timer behind each
     is_other = copy.octets != request.octets and len(copy.octets) != len(request.octets)
     if is_other and (resembles or not learnt.is_same(gap, pause)):
         return Verdict.ANSWERED

@@ -16,6 +16,7 @@ from dissectors.tracker import Transaction, Verdict
 GIVE_UP = 5 * NS_PER_S
 """An unanswered request is closed after 5 s of nothing while the master's timeout is unlearnt."""
 
+_ENDLESS_KEPT = 64
 _LATE = 3  # times what the master waited, within which an answer may still come
 _WAITED_LEAST = 50_000_000  # ns; no master gives up sooner, it only seems so where an answer was missed
 
@@ -30,7 +31,8 @@ class Exchanges:
     the open one, whose verdicts wait for it. `closed`: by the event under way. `only`: what all frames so far say;
     empty when they differ. `heard`: of each unit, the transaction that it answered last. `makers`: units with functions
     without a layout that they have answered. `copies_come_late`: whether copies of requests given up came into the wait
-    for others; `crossed`: the newest request that one was taken to have come after.
+    for others; `crossed`: the newest request that one was taken to have come after. `twice`: the newest frame
+    that seemed to be a second answer; `endless`: what is said again and again with hardly a pause.
     """
 
     def __init__(self, learnt: LearnedTiming, echoes: Echoes) -> None:
@@ -49,6 +51,8 @@ class Exchanges:
         self.makers: set[tuple[int, int]] = set()
         self.copies_come_late = False
         self.crossed: Exchange | None = None
+        self.twice = 0
+        self.endless: set[bytes] = set()
 
     @property
     def is_at_rest(self) -> bool:
@@ -143,6 +147,13 @@ class Exchanges:
             self.makers.add((request.unit, request.octets[1]))
         for before in self.given_up:
             before.outlives |= before.unit == request.unit and request.since <= before.tx < request.tx
+
+    def goes_on(self, seen: Seen) -> bool:
+        """Whether a copy that comes too soon for this master is its next request all the same: nobody answers three
+        times, so who says the same for the fourth time sends it for ever."""
+        if seen.no == self.twice + 1 and len(self.endless) < _ENDLESS_KEPT:
+            self.endless.add(seen.octets)
+        return seen.octets in self.endless
 
     def close_as_late(self, copy: Exchange, before: Exchange) -> None:
         """The open request was none, but the late answer to one before."""

@@ -45,13 +45,14 @@ class Promptness:
         limit = max((limit for limit in limits if limit is not None), default=AT_ONCE)
         return request.gap(seen.frame.start) <= limit
 
-    def is_doubtful(self, request: Exchange, seen: Seen) -> bool:
-        """Whether a frame that comes late, for all that is learnt, may be the answer of a slow station."""
+    def is_doubtful(self, request: Exchange, seen: Seen, fits: bool) -> bool:
+        """Whether a frame that comes late, for all that is learnt, may be the answer of a slow station. `fits`: it is
+        what was asked for, as far as its octets tell (of some reads of coils they tell no more)."""
         if self.knows(request) or self._learnt.timeout is not None or request.garble or request.fault or request.silent:
             return False
         if request.unit == BROADCAST:
             return False
-        return request.octets == seen.octets or has_no_layout(seen)
+        return request.octets == seen.octets or has_no_layout(seen) or fits
 
     def is_too_soon(self, request: Exchange, seen: Seen) -> bool:
         """Whether it began before the station can have seen the end of this repeat: it answers an earlier attempt."""

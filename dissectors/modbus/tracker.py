@@ -204,7 +204,7 @@ class ModbusTracker(TrackerMemory):
             near = request.octets[:4] == seen.octets[:4] and self._times.is_prompt(request, seen)
             if (why is None or near or seen.header.role is Role.UNKNOWN) and self._times.in_time(request, seen):
                 return self._answer(request, seen, why)
-            if self._times.is_doubtful(request, seen):
+            if self._times.is_doubtful(request, seen, fits=why is None):
                 return self._join(request, seen)
         elif (
             request.octets[1:] == seen.octets[1:] and self._times.knows(request) and self._times.in_time(request, seen)
@@ -254,7 +254,10 @@ class ModbusTracker(TrackerMemory):
         gap = 0 if self._last_end is None else max(0, seen.frame.start - self._last_end)
         too_soon = gap < self.learnt.too_soon(self._silence) and not self._may_be_next(gap, seen)
         if last is not None and last.octets == seen.octets and too_soon:
+            if last.answered and self._held.goes_on(seen):
+                return self._request(seen, sure=False)
             if last.answered:
+                self._held.twice = seen.no
                 return self._answer_apart(seen, Verdict.ANSWERED_TWICE, last)
             return self._echo(seen)
         return self._request(seen, sure=False)

@@ -13,9 +13,10 @@ from dissectors.modbus.rules import RULES
 from dissectors.modbus.tracker import ModbusTracker
 
 
-def findings_of(bus) -> tuple[Finding, ...]:
-    """All findings about what was said on a paper bus, RTU."""
-    tracker, judge = ModbusTracker(bus.timing), ModbusFindings(bus.timing)
+def findings_of(bus, is_told: bool = True) -> tuple[Finding, ...]:
+    """All findings about what was said on a paper bus, RTU. `is_told`: whether somebody said what adapter it was."""
+    timing = replace(bus.timing, is_told=is_told)
+    tracker, judge = ModbusTracker(timing), ModbusFindings(timing)
     for no, event in enumerate(bus.events, 1):
         header = peek_rtu(event) if isinstance(event, Frame) else None
         tracked = tracker.track(no, event, header)

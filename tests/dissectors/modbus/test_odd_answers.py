@@ -93,3 +93,28 @@ def test_another_interface_behind_function_43_may_take_long(bus):
         bus.exchange(f"012b0d0107{value:02x}", f"012b0d0107{value:02x}0304", answer=400, pause=900)
         bus.exchange(OTHER, OTHER_VALUES)
     assert graves_of(bus) == set()
+
+
+@pytest.mark.parametrize("answer", [115, 240])
+def test_bits_whose_answer_looks_like_a_request_may_take_long(bus, answer):
+    """Twenty coils from 0310 on: request and answer have eight octets each and could be either."""
+    bus.exchange("010600010002", "010600010002", answer=answer - 5)
+    for value in range(4):
+        bus.exchange("010103100014", f"010103f601{value:02x}", answer=answer).exchange(OTHER, OTHER_VALUES)
+    assert set(bus.run().verdicts) == {"answered"}
+    assert graves_of(bus) == set()
+
+
+def test_bits_of_a_station_that_is_not_there_are_not_its_answers(bus):
+    for _ in range(4):
+        bus.say("010103100014").say("010103300014", 300).exchange(OTHER, OTHER_VALUES, pause=300)
+    assert graves_of(bus) == {("MB001", "station 1")}
+
+
+def test_a_value_sent_for_ever_is_not_answered_twice(bus):
+    """Beside it others are written to now and then, with a longer pause."""
+    for round_ in range(8):
+        bus.say(f"00060003{round_:04x}", 30)
+        for turn in range(6):
+            bus.exchange("011613067f7126ff", "011613067f7126ff", answer=6, pause=200 if not turn else 7)
+    assert graves_of(bus) == set()
