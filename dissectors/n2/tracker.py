@@ -12,8 +12,8 @@
 5. A second good answer without a command between: late where a command a short while ago is owed one of that form (of
    the two answers either may be the late one), or was damaged or had a damaged answer, else answered twice. Whether
    that means two stations is for the rules to say: the same octets again may be a repeater's. Where there is room for
-   a command that was missed at this tap, it answers that one, unasked; a station that has answered four later commands
-   owes nothing any more.
+   a command that was missed at this tap, it answers that one, unasked, unless a try of the command answered before it
+   is owed one; a station that has answered four later commands owes nothing any more.
 6. How long a master waits is its own setting (NAE 250 ms to 3 s), so silence alone closes a command after GIVE_UP.
 7. A damaged command is for the station that it names where that one is known; else for the one known station whose
    address makes its checksum right, and is most like what was sent.
@@ -314,7 +314,12 @@ class N2Tracker:
             station = done.station if done is not None else missed.station if missed is not None else None
             return self._separate(no, frame, header, Verdict.UNSOLICITED, None, closed, station)
         if done is not None and self._has_room(done, frame):
-            return self._separate(no, frame, header, Verdict.UNSOLICITED, None, closed)
+            tries = [one for one in self._within(frame.start) if one.first_try == done.first_try]
+            owing = best_owed(tries, frame)  # each try of one command has its answer
+            if owing is None:
+                return self._separate(no, frame, header, Verdict.UNSOLICITED, None, closed)
+            self._forget(owing)
+            return self._separate(no, frame, header, Verdict.LATE, owing, closed)
         if done is not None:
             owed = self._within(frame.start)
             same = [exchange for exchange in owed if exchange.station == done.station]

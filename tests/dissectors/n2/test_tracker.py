@@ -379,3 +379,17 @@ def test_a_damaged_command_stands_at_the_known_station_that_it_fits(damaged, sta
         bus.say(command)
         bus.say(VALUE)
     assert bus.say(damaged).placement.destination == station
+
+
+def test_each_try_of_a_slow_station_has_its_answer_even_where_there_was_room_for_a_command():
+    bus = Bus()
+    for _ in range(4):
+        bus.say(READ_OTHER, 60 * MS)
+        bus.say(VALUE)
+    for _ in range(3):
+        bus.say(READ, 60 * MS)
+        bus.say(READ, 250 * MS)
+        bus.say(VALUE, 16 * MS)
+        bus.say(VALUE, 220 * MS)
+    assert bus.verdicts()[4:] == [Verdict.NO_RESPONSE, Verdict.RETRY, Verdict.LATE] * 3
+    assert {one.station for one in bus.closed if one.verdict is Verdict.LATE} == {1}
