@@ -56,7 +56,8 @@ def _limits(message: Message, space: str) -> tuple[_Limit, ...]:
         if field.means is Means.ADDRESS:
             address = at
         elif field.among is not None and field.size == 2 and field.means in (Means.QUANTITY, Means.VALUE):
-            made.append(_Limit(at, field.among, _in_words(field.among, field.means, space), address))
+            counted = address if field.means is Means.QUANTITY else None
+            made.append(_Limit(at, field.among, _in_words(field.among, field.means, space), counted))
             address = None
     return tuple(made)
 

@@ -31,7 +31,7 @@ def test_what_no_request_may_ask_for(request_, words):
     assert beyond_limits(bytes.fromhex(request_)) == words
 
 
-@pytest.mark.parametrize("request_", ["01030000007d", "0103ffff0001", "01050003ff00", "010600030001", "0141", "01", ""])
+@pytest.mark.parametrize("request_", ["01030000007d", "0103ffff0001", "01058945ff00", "01068945ff00", "0141", "01", ""])
 def test_what_a_request_may_ask_for(request_):
     assert beyond_limits(bytes.fromhex(request_)) is None
 
