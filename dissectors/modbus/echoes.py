@@ -5,6 +5,7 @@ A bus with an echo (a converter or adapter that hears itself) gives back every r
 
 from __future__ import annotations
 
+from dissectors.frame import Damage
 from dissectors.line import Timing
 from dissectors.modbus.exchange import Exchange, Seen, is_begin_of
 from dissectors.modbus.functions import BROADCAST
@@ -62,7 +63,16 @@ class Echoes:
         if not is_begin_of(octets, request.request.frame.octets):
             return False
         gap = request.gap(start)
-        return gap < self.limit or (gap < AT_ONCE and request.sure)
+        if request.sure:
+            return gap < self.limit or gap < AT_ONCE
+        return gap < self.limit and self.usual is not False  # a confirmation may be cut short, too
+
+    def is_cut_behind(self, last: Exchange | None, seen: Seen, end: int | None) -> bool:
+        """Whether a frame is the begin of a request that was answered by then, directly behind that answer (`end`):
+        what gives requests back, or confirms them, was cut short. No master goes on so soon."""
+        if last is None or end is None or seen.frame.damage is not Damage.SHORT:
+            return False
+        return seen.frame.start - end < self.limit and is_begin_of(seen.frame.octets, last.request.frame.octets)
 
     def learn(self, echoed: bool) -> None:
         """One more request that a station answered, with its copy before the answer or without. One says little where

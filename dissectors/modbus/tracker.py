@@ -269,6 +269,8 @@ class ModbusTracker(TrackerMemory):
             return self._echo(seen, f"the echo ends after {len(seen.frame.octets)} octets")
         error = seen.header.error or "damaged"
         if request is None:
+            if self._echoes.is_cut_behind(self._held.last, seen, self._last_end):
+                return self._echo(seen, f"a copy that ends after {len(seen.frame.octets)} octets")
             if seen.header.role is Role.RESPONSE:
                 return self._answer_apart(seen, Verdict.UNSOLICITED)
         elif self._is_damaged_answer(request, seen):

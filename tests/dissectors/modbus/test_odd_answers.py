@@ -118,3 +118,22 @@ def test_a_value_sent_for_ever_is_not_answered_twice(bus):
         for turn in range(6):
             bus.exchange("011613067f7126ff", "011613067f7126ff", answer=6, pause=200 if not turn else 7)
     assert graves_of(bus) == set()
+
+
+def test_a_confirmation_that_was_cut_short_is_no_echo_where_reads_have_none(bus):
+    well(bus, 6)
+    for value in range(4):
+        bus.exchange(OTHER, OTHER_VALUES).say(WRITE.format(value)).cut(WRITE.format(value), 5, gap=0.5)
+    bus.exchange(OTHER, OTHER_VALUES, pause=300)
+    assert {subject for _, subject in graves_of(bus)} == {"station 3"}
+    assert "echo" not in bus.run().verdicts
+
+
+def test_the_begin_of_a_confirmed_request_behind_its_confirmation_is_no_request(paper_bus):
+    bus = paper_bus(latency=16_000_000)
+    well(bus, 6)
+    for value in range(5):
+        bus.exchange(OTHER, OTHER_VALUES, pause=60)
+        bus.exchange(WRITE.format(value), WRITE.format(value), answer=9).cut(WRITE.format(value), 5, gap=0.0)
+    bus.exchange(OTHER, OTHER_VALUES, pause=300)
+    assert not any(subject == "master" for _, subject in graves_of(bus))
