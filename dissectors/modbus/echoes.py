@@ -5,6 +5,8 @@ A bus with an echo (a converter or adapter that hears itself) gives back every r
 
 from __future__ import annotations
 
+from collections import deque
+
 from dissectors.frame import Damage
 from dissectors.line import Timing
 from dissectors.modbus.exchange import Exchange, Seen, is_begin_of
@@ -15,9 +17,10 @@ from dissectors.modbus.promptness import AT_ONCE
 ECHO_VOTES = 4
 """Answered requests with an echo, or without, that count at most against what is seen now."""
 
-
 MOST_VOTES = 2 * ECHO_VOTES
 """More answers without an echo than these decide nothing."""
+
+_GAPS_KEPT = 8
 
 
 class Echoes:
@@ -34,6 +37,7 @@ class Echoes:
         self.limit = max(silence, timing.char + timing.latency)
         self.usual: bool | None = None
         self._votes = 0  # answered requests with an echo, less those without
+        self._gaps: deque[int] = deque(maxlen=_GAPS_KEPT)  # before the newest echoes of requests that are surely some
 
     def is_of_request(self, newest: Exchange | None, seen: Seen) -> bool:
         """Whether a sure request repeats the newest one at once; a master repeats only after its timeout."""
@@ -47,7 +51,7 @@ class Echoes:
     def is_of_write(self, request: Exchange, seen: Seen) -> bool:
         """Whether a copy that could be an answer comes too soon to be one."""
         latency = request.latency(seen.frame)
-        if request.echoed or latency.low > self.limit:
+        if request.echoed or latency.low > max(self.limit, self._usual_gap() * 3 // 2):
             return False
         if self.usual is not None:
             return self.usual
@@ -57,6 +61,14 @@ class Echoes:
             return True
         fastest = self._learnt.fastest(request.unit)
         return fastest is not None and latency.nominal + self._timing.char < fastest // 2
+
+    def note(self, gap: int) -> None:
+        """A request that is surely one came back `gap` ns after it."""
+        self._gaps.append(gap)
+
+    def _usual_gap(self) -> int:
+        """How long after a request its echo begins, ns, where this bus has one; 0 where not."""
+        return sorted(self._gaps)[len(self._gaps) // 2] if self.usual and self._gaps else 0
 
     def is_cut(self, request: Exchange, octets: bytes, start: int) -> bool:
         """Whether octets are the begin of the request, given back at once and cut short."""

@@ -93,7 +93,8 @@ def holding(
     end = _first(_impatient(found, frames, place, end, known, timing), place, end)
     if known.echoing is not False:
         sure = np.cumsum(found.sure[place:end] & found.answered[place:end])
-        end = _first(found.at_once[place:end] & (sure < (VOTES if known.echoing else 1)), place, end)
+        copies = found.copy if known.echoing else found.at_once  # an echo comes when it usually does
+        end = _first(copies[place:end] & (sure < (VOTES if known.echoing else 1)), place, end)
     begin = int(np.searchsorted(found.run, found.run[place]))
     warm = SAMPLES + (place if since is None else since) - begin
     end = _first_late(found, place, end, warm, known, LearnedTiming(timing).tolerance)

@@ -69,13 +69,12 @@ class OddAnswers:
         self._held.crossed = request
         return late
 
-    def learn(self, between: Exchange) -> Exchange | None:
-        """The request before another one was answered after all, so that the other came into the wait for it: the one
-        given up that it answers, as a copy; None where it is no copy."""
-        if between.sure or not between.octets:
+    def learn(self, between: Exchange, answered: Exchange) -> Exchange | None:
+        """A request was answered after all when another one had come, into the wait for it: the one given up that the
+        other answers, as a copy; None where it is no copy, or is that request again."""
+        if between.sure or not between.octets or between.octets == answered.octets:
             return None
-        copied = (one for one in reversed(self._held.given_up) if one is not between and one.octets == between.octets)
-        late = next(copied, None)
+        late = next((one for one in reversed(self._held.given_up) if one.octets == between.octets), None)
         if late is not None:
             self._held.copies_come_late = True
         return late

@@ -98,6 +98,8 @@ class ModbusTracker(TrackerMemory):
         if sure and self._echoes.is_of_request(self._held.open or self._held.last, seen):
             if self._echoes.usual is None:
                 self._echoes.usual = True
+            newest = self._held.open or self._held.last
+            self._echoes.note(0 if newest is None else newest.gap(seen.frame.start))
             return self._echo(seen)
         if self._held.open is not None and self._held.open.copies:
             self._held.finish_copies(self._held.open, seen)
@@ -162,7 +164,7 @@ class ModbusTracker(TrackerMemory):
             elif late is None:
                 return self._from_elsewhere(request, seen)
             request.disturbed = True
-            if late is not None and (copied := self._odd.learn(request)) is not None:
+            if late is not None and (copied := self._odd.learn(request, late)) is not None:
                 self._held.close_as_late(request, copied)
         if late is not None:
             self._held.given_up.remove(late)

@@ -137,3 +137,20 @@ def test_the_begin_of_a_confirmed_request_behind_its_confirmation_is_no_request(
         bus.exchange(WRITE.format(value), WRITE.format(value), answer=9).cut(WRITE.format(value), 5, gap=0.0)
     bus.exchange(OTHER, OTHER_VALUES, pause=300)
     assert not any(subject == "master" for _, subject in graves_of(bus))
+
+
+def test_a_repeat_that_could_be_an_answer_is_no_late_copy(bus):
+    """Ten inputs from 0300 on, asked twice; the first try is answered when the second has come."""
+    for _ in range(4):
+        bus.exchange(OTHER, OTHER_VALUES).say("01020300000a").say("01020300000a", 500).say("01020255 02", 4)
+    assert bus.run().verdicts.count("late") + bus.run().verdicts.count("retry") == 4
+
+
+def test_the_echo_of_a_write_comes_when_echoes_of_reads_do(paper_bus):
+    """0.4 ms are more than 3.5 characters of 115200 Bd, where a station could answer."""
+    bus = paper_bus("115200,8N1")
+    for value in range(6):
+        bus.say(READ).say(READ, 0.4).say(VALUES, 8)
+        bus.say(WRITE.format(value)).say(WRITE.format(value), 0.4).say(WRITE.format(value), 9)
+    assert set(bus.run().verdicts) == {"echo", "answered"}
+    assert graves_of(bus) == set()
