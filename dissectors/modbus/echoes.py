@@ -68,7 +68,8 @@ class Echoes:
 
     def _usual_gap(self) -> int:
         """How long after a request its echo begins, ns, where this bus has one; 0 where not."""
-        return sorted(self._gaps)[len(self._gaps) // 2] if self.usual and self._gaps else 0
+        usual = sorted(self._gaps)[len(self._gaps) // 2] if self.usual and self._gaps else 0
+        return min(usual, self._timing.t35 + self._timing.latency)  # later than that a station may have begun
 
     def is_cut(self, request: Exchange, octets: bytes, start: int) -> bool:
         """Whether octets are the begin of the request, given back at once and cut short."""

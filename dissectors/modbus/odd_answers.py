@@ -18,7 +18,7 @@ from dissectors.modbus.functions import FUNCTIONS
 from dissectors.modbus.limits import beyond_limits
 from dissectors.modbus.notation import HEAD
 from dissectors.modbus.pairing import mismatch
-from dissectors.modbus.promptness import AT_ONCE, Promptness
+from dissectors.modbus.promptness import AT_ONCE, Promptness, has_no_layout
 
 _ADDRESS_END = HEAD + 2
 
@@ -60,21 +60,40 @@ class OddAnswers:
         return is_plain and has_layout and self._times.is_prompt(request, seen)
 
     def late(self, request: Exchange, seen: Seen) -> Exchange | None:
-        """The request given up that a copy of it answers, where another one waits; None where it may be a repeat."""
-        if not (self._held.copies_come_late and request.sure) or request.gap(seen.frame.start) >= AT_ONCE:
+        """The request given up that a frame answers, where another one waits; None where it may be a request."""
+        gap = request.gap(seen.frame.start)
+        if not self._held.copies_come_late or gap >= AT_ONCE:
             return None
         late = self._held.late_for(seen)
-        if late is None or late.octets != seen.octets or (late.waited or 0) < AT_ONCE:
+        if late is None or not _may_answer(late, seen) or (late.waited or 0) < max(AT_ONCE, 2 * gap):
             return None
         self._held.crossed = request
         return late
 
     def learn(self, between: Exchange, answered: Exchange) -> Exchange | None:
         """A request was answered after all when another one had come, into the wait for it: the one given up that the
-        other answers, as a copy; None where it is no copy, or is that request again."""
+        other answers; None where it is none's answer, or is that request again."""
         if between.sure or not between.octets or between.octets == answered.octets:
             return None
-        late = next((one for one in reversed(self._held.given_up) if one.octets == between.octets), None)
+        fitting = (one for one in reversed(self._held.given_up) if one is not answered and one is not between)
+        late = next((one for one in fitting if _may_answer(one, between.request)), None)
         if late is not None:
             self._held.copies_come_late = True
         return late
+
+    def crossing(self, between: Exchange, seen: Seen) -> tuple[Exchange, Exchange] | None:
+        """The same where the other answer is a copy, too: which two requests were given up that `between` and the next
+        frame answer. The second of them hardly waited, as no master does that waited for the first."""
+        answered = self._held.given_up[-1] if self._held.given_up else None
+        if answered is None or answered.octets != seen.octets or answered.waited is None:
+            return None
+        if answered.waited >= AT_ONCE or between.attempt > 1 or not self._times.is_prompt(between, seen):
+            return None
+        late = self.learn(between, answered)
+        is_waited_for = late is not None and (late.waited or 0) >= max(AT_ONCE, 2 * answered.waited)
+        return (late, answered) if late is not None and is_waited_for else None
+
+
+def _may_answer(request: Exchange, seen: Seen) -> bool:
+    """Whether a frame that could be a request is an answer to that one: its copy, or of a function without a layout."""
+    return request.octets == seen.octets or (has_no_layout(seen) and request.octets[:HEAD] == seen.octets[:HEAD])

@@ -218,6 +218,10 @@ class ModbusTracker(TrackerMemory):
             request.disturbed = True
             self._held.given_up.remove(late)
             return self._answer_apart(seen, Verdict.LATE, late)
+        elif (crossed := self._odd.crossing(request, seen)) is not None:
+            self._held.close_as_late(request, crossed[0])
+            self._held.given_up.remove(crossed[1])
+            return self._answer_apart(seen, Verdict.LATE, crossed[1])
         return self._request(seen, sure=False)
 
     def _after_copy(self, request: Exchange, seen: Seen) -> Placement:

@@ -154,3 +154,28 @@ def test_the_echo_of_a_write_comes_when_echoes_of_reads_do(paper_bus):
         bus.say(WRITE.format(value)).say(WRITE.format(value), 0.4).say(WRITE.format(value), 9)
     assert set(bus.run().verdicts) == {"echo", "answered"}
     assert graves_of(bus) == set()
+
+
+@pytest.mark.parametrize(
+    ("asked", "answer", "hit"),
+    [
+        (WRITE, WRITE, ("0106000900{:02x}", "0106000900{:02x}")),
+        ("034100{:02x}", "034100{:02x}0102", (READ, VALUES)),
+        ("03160004{:04x}0025", "03160004{:04x}0025", (READ, VALUES)),
+    ],
+)
+def test_whatever_is_confirmed_late_in_the_wait_for_whatever_is_late(bus, asked, answer, hit):
+    for value in range(8):
+        bus.exchange(OTHER, OTHER_VALUES).say(asked.format(value), 60).say(hit[0].format(value), 800)
+        bus.say(answer.format(value), 10).say(hit[1].format(value), 8)
+    bus.exchange(OTHER, OTHER_VALUES)
+    assert graves_of(bus) == {("MB103", "station 3")}
+
+
+@pytest.mark.parametrize("timeout", [40, 300])
+def test_two_dead_stations_that_are_written_to_in_turns_are_dead(bus, timeout):
+    for _ in range(8):
+        bus.exchange(OTHER, OTHER_VALUES).say("030600050007", 60).say("010600090007", timeout)
+        bus.say("030600050007", timeout).say("010600090007", timeout)
+        bus.exchange(OTHER, OTHER_VALUES, pause=timeout)
+    assert graves_of(bus) >= {("MB001", "station 1"), ("MB001", "station 3")}
