@@ -65,7 +65,9 @@ def _of_one(ring: Ring, mac: int, node: RingNode) -> Iterable[Remark]:
     sent = _sent(node)
     replies = ring.of(RingEventKind.DAMAGED_REPLY, mac).count
     if node.cut_last >= DAMAGED_LEAST and node.cut_last >= AT_END_SHARE * node.damaged:
-        seen = f"{node.cut_last} of its {sent} frames lack their last octet, or it is wrong; all before it is right"
+        seen = (
+            f"{node.cut_last} of its {sent} frames lack their last octet or two, or it is wrong; all before that fits"
+        )
         yield plain("MS405", ring, mac, seen, node.cut_last)
     if node.damaged > DAMAGED_OF_ONE_SHARE * sent and _is_there(node):
         seen = f"{node.damaged} of its {sent} frames damaged"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dissectors.bacnet.frame_types import HEADER, is_encoded
+from dissectors.bacnet.frame_types import HEADER, PREAMBLE, is_encoded
 from dissectors.bacnet.header import is_whole_header
 from dissectors.bacnet.mending import WITHOUT_DATA
 from dissectors.bacnet.ring_tally import RingTally
@@ -10,6 +10,7 @@ from dissectors.bacnet.turn import Speaker, Turn
 from dissectors.checksums import crc8_mstp, crc16_x25
 from dissectors.frame import Damage, Flaw, Frame, Header
 
+_CUT = frozenset((Damage.SHORT, Damage.RESTARTED))
 _AT_END = frozenset((Flaw.LAST_MISSING, Flaw.LAST_TWO_MISSING))
 
 
@@ -51,8 +52,11 @@ def only_its_end(frame: Frame, speaker: Speaker) -> bool:
     octets = frame.octets
     if frame.damage is Damage.CHECK and not is_encoded(octets[2]):
         return octets[-2] == crc16_x25(octets[HEADER:-2]) & 0xFF
-    if frame.damage is not Damage.HEADER or len(octets) != HEADER:
+    if len(octets) < HEADER - 2 or octets[2] not in WITHOUT_DATA:
         return False
-    said = octets[2], octets[3], octets[4], octets[5:7]
-    due = speaker.frame_type, speaker.destination, speaker.source, b"\x00\x00"
-    return said == due and octets[2] in WITHOUT_DATA and crc8_mstp(octets[2:7]) != octets[7]
+    due = bytes((*PREAMBLE, octets[2], speaker.destination or 0, speaker.source, 0, 0))
+    if octets[2:5] != due[2:5] or speaker.frame_type != octets[2] or speaker.destination is None:
+        return False
+    if frame.damage in _CUT:
+        return octets == due[:-1]
+    return frame.damage is Damage.HEADER and octets[:-1] == due and crc8_mstp(due[2:]) != octets[7]

@@ -249,9 +249,8 @@ _ALL = (
         "MS405",
         Severity.WARNING,
         "last octet missing",
-        "At least three damaged frames of one station, and four in five of all its damaged ones, are right but "
-        "for their "
-        "last octet or two, which are missing or wrong.",
+        "At least three damaged frames of one station, and four in five of all its damaged ones, are as they should be "
+        "but for their last octet or two, which are missing or wrong.",
         "its driver is switched off too early, before the last octet is out",
         "the turnaround or transmit-delay setting of that station, its firmware, its converter's direction control",
         explains=("MS401", "MS402", "MS102", "MS301", "LN101", "LN2"),
