@@ -107,7 +107,7 @@ class BulkRingObserver(MstpRingObserver):
                 self._unheard.heard(passed)
         self._holder, self._passed_by, self._token = int(columns.after[last]), None, None
         if columns.token[last]:
-            self._passed_by, self._token = source, frame
+            self._passed_by, self._token, self._disturbed = source, frame, False
         self._questions.asked = None
         if columns.asks[last]:
             kind = int(columns.kind[last])

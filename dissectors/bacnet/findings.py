@@ -174,6 +174,8 @@ def _counted(ring: Ring) -> Iterable[Remark]:
                     severity = Severity.NOTE
                 if code == "MS301" and is_rare(happened.count, node.requests_received if node else 0, ring.span):
                     severity = Severity.NOTE
+                if code == "MS404" and happened.count == 1 and ring.header_errors + ring.data_errors + ring.cut:
+                    severity = Severity.NOTE  # damage that happens to fit a header check of eight bits
                 seen = words.format(times=times(happened.count), requests=counted(happened.count, "request"))
                 # a forbidden address is the sender's affair, and may stand for no station
                 yield of(code, mac, seen, happened, severity, pair=what is not RingEventKind.ILLEGAL)

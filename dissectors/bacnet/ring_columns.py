@@ -111,7 +111,7 @@ class RingColumns:
         masters = (self.source <= MAX_MASTER) & (self.destination <= MAX_MASTER)
         allowed: Masks = (self.source != BROADCAST) & (self.source != self.destination)
         allowed &= masters | (self.kind > _POLL)
-        allowed &= (self.length <= HEADER + MAX_DATA + _CRC) & ~(self._expecting & self.to_all)
+        allowed &= (self.length <= HEADER + MAX_DATA + _CRC) & ~(self._expecting & ~self.asked)
         if "i-am" in frames.names:
             allowed &= frames.kind != frames.names.index("i-am")
         return allowed

@@ -20,7 +20,7 @@ from dissectors.bacnet.ring_questions import AskedInRing
 from dissectors.bacnet.ring_tally import NodeTally
 from dissectors.bacnet.ring_window import Happening, MstpRingWindow, RingJournal
 from dissectors.bacnet.storms import Storms
-from dissectors.bacnet.token_watch import TokenWatch
+from dissectors.bacnet.token_watch import AT_ONCE, TokenWatch
 from dissectors.bacnet.turn import Turn
 from dissectors.frame import Damage, Event, Frame, Header, Noise, Role
 from dissectors.line import Timing
@@ -71,7 +71,7 @@ class MstpRingObserver(TokenWatch):
                 if len(event.octets) >= N_MIN_OCTETS:  # fewer prove nothing: who was asked may still answer
                     self._questions.asked = None
                     self._disturb(no, event.start)
-                self._doubt, self._broke_off = True, False
+                self._doubt, self._broke_off, self._disturbed = True, False, True
             else:
                 self._see_hole(event.start)
         else:
@@ -144,7 +144,7 @@ class MstpRingObserver(TokenWatch):
             assert header.source is not None
             assert header.destination is not None
             self._questions.asked = AskedInRing(header.function, header.source, header.destination, frame, no)
-        self._doubt = True
+        self._doubt = self._disturbed = True
 
     def _disturb(self, no: int, start: int) -> bool:
         """Whether octets that are no good frame may be of two: of the next one, and of one that has a second token."""
@@ -172,9 +172,11 @@ class MstpRingObserver(TokenWatch):
             took = self._repeated.see(frame, frame_type, source, destination)
             if took is not None:
                 tally.note(RingEventKind.USED_BOTH, frame.start, no, slow, None, took)
-        self._questions.holder = self._holder
+        self._questions.holder, asked = self._holder, self._questions.asked
         answers = self._questions.is_answer(no, frame, frame_type, source, destination, node)
         check_addresses(tally, no, frame, frame_type, source, destination)
+        if self._doubt and not answers and frame_type in AT_ONCE:
+            self._answers_unread(destination)
         if frame_type == _TOKEN:
             if not answers:
                 self._take_turn(no, frame, source, node, header)
@@ -189,8 +191,9 @@ class MstpRingObserver(TokenWatch):
                 tally.note(RingEventKind.REJOINED, frame.start, no, source, destination)
                 node.gone = False
         elif frame_type == _POSTPONED:
-            node.postponed += 1
-            tally.enter(Happening.POSTPONED, no, source)
+            if asked is None or not asked.free:
+                node.postponed += 1
+                tally.enter(Happening.POSTPONED, no, source)
         elif frame_type != _TEST_REPLY:
             if not answers:
                 self._take_turn(no, frame, source, node, header)
@@ -237,9 +240,11 @@ class MstpRingObserver(TokenWatch):
         if frame_type in EXPECTING and not answers:
             if destination == BROADCAST:
                 self._tally.note(RingEventKind.BROADCAST_REQUEST, frame.start, no, source)
-            elif header.role is Role.REQUEST:  # answers and what is unconfirmed ask for nothing, whatever the type says
-                node.requests_sent += 1
-                self._tally.node(destination).requests_received += 1
-                self._questions.asked = AskedInRing(frame_type, source, destination, frame, no)
+            else:  # answers and what is unconfirmed want nothing, but by their type they may be answered at once
+                asks = header.role is Role.REQUEST
+                if asks:
+                    node.requests_sent += 1
+                    self._tally.node(destination).requests_received += 1
+                self._questions.asked = AskedInRing(frame_type, source, destination, frame, no, free=not asks)
         if header.kind == "i-am":
             see_i_am(self._tally, no, frame, source, node)

@@ -35,6 +35,7 @@ class AskedInRing:
     """The frame that waits for its answer.
 
     `missed`: it was counted as one that nobody answered. `answered`: it must have been, though that was not heard.
+    `free`: it asks by its frame type alone, as segments of an answer do; who is asked may answer now, later or not.
     """
 
     frame_type: int
@@ -44,6 +45,7 @@ class AskedInRing:
     no: int
     missed: bool = False
     answered: bool = False
+    free: bool = False
 
 
 class RingQuestions:
@@ -129,7 +131,7 @@ class RingQuestions:
         node.reply.add(took)
         if surely_over(frame, asked.frame, T_REPLY_DELAY):
             self._reads.add(RingEvent(RingEventKind.LATE_REPLY, frame.start, no, source, destination, took))
-        if frame_type == FrameType.REPLY_POSTPONED:
+        if frame_type == FrameType.REPLY_POSTPONED and not asked.free:
             self._postponed.append((source, destination, asked.frame.end))
         return True
 
@@ -164,7 +166,7 @@ class RingQuestions:
             self._tally.note(RingEventKind.TOO_SOON, frame.start, no, asked.source, asked.destination, took)
 
     def _unanswered_request(self, asked: AskedInRing, frame: Frame) -> None:
-        if not asked.frame.ok:  # it may have been damaged for everybody
+        if asked.free or not asked.frame.ok:  # it may have been damaged for everybody
             return
         key = asked.destination, asked.source
         self._unanswered[key] = asked

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dissectors.bacnet.frame_types import HEADER, FrameType
 from dissectors.bacnet.held_reads import HeldReads, surely_over
-from dissectors.bacnet.limits import MAX_MASTER, T_NO_TOKEN, T_USAGE_DELAY, T_USAGE_TIMEOUT, TURNAROUND_BITS
+from dissectors.bacnet.limits import BROADCAST, MAX_MASTER, T_NO_TOKEN, T_USAGE_DELAY, T_USAGE_TIMEOUT, TURNAROUND_BITS
 from dissectors.bacnet.lost_tokens import longest_wait, makes_token
 from dissectors.bacnet.repeated_token import RepeatedToken
 from dissectors.bacnet.ring import RingEvent, RingEventKind
@@ -27,7 +27,8 @@ from dissectors.line import Timing
 _HOLD_MAX = 64  # longest run of data frames that is counted by itself
 
 _TOKEN, _POLL = int(FrameType.TOKEN), int(FrameType.POLL_FOR_MASTER)  # plain numbers compare faster than members
-_ANSWERS = frozenset(map(int, (FrameType.REPLY_TO_POLL_FOR_MASTER, FrameType.TEST_RESPONSE, FrameType.REPLY_POSTPONED)))
+AT_ONCE = frozenset(map(int, (FrameType.REPLY_TO_POLL_FOR_MASTER, FrameType.TEST_RESPONSE, FrameType.REPLY_POSTPONED)))
+"""Answers that are sent at once or not at all: to the one that has the token."""
 
 
 class TokenWatch:
@@ -40,6 +41,7 @@ class TokenWatch:
         self._holder: int | None = None  # None: not known
         self._passed_by: int | None = None  # who passed the token to the holder, while the holder has not used it
         self._token: Frame | None = None  # that token, while unused
+        self._disturbed = False  # octets that are no good frame came since then: they may have been its use
         self._second = SecondTokens(self._tally)
         self._repeated = RepeatedToken()
         self._got: int | None = None  # when the holder got the token
@@ -71,7 +73,7 @@ class TokenWatch:
         self._questions.give_up(no, frame, source)
         if self._unheard.is_mute(self._holder):  # whatever it sends is silence here
             tally.note(RingEventKind.UNHEARD, frame.start, no, self._holder, source)
-        elif frame.octets[2] in _ANSWERS:  # somebody had the token and asked
+        elif frame.octets[2] in AT_ONCE:  # somebody had the token and asked
             tally.note(RingEventKind.UNHEARD, frame.start, no, frame.octets[3], source)
         elif tally.edges:  # where no token was ever seen, none can be lost
             silence = self._silence(frame)
@@ -105,12 +107,15 @@ class TokenWatch:
         if source == self._holder:
             if self._token is not None:  # its first frame with this token, or the first that was not damaged
                 gap = frame.start - self._token.end
-                if not self._doubt:
+                if not self._doubt and not self._disturbed:
                     node.use.add(gap)
                     self._tally.enter(Happening.USE, no, source, gap)
                     if surely_over(frame, self._token, T_USAGE_DELAY):
                         self._late(RingEventKind.LATE_USE, no, frame, source, self._passed_by, gap)
                 self._token = self._passed_by = None
+            return
+        if self._doubt and self._may_answer(frame, header):
+            self._forget()
             return
         if self._was_asked(no, frame, source, header):
             return
@@ -204,6 +209,21 @@ class TokenWatch:
             self._hold_unseen(client)
         return True
 
+    def _may_answer(self, frame: Frame, header: Header) -> bool:
+        """Whether it may be the answer to octets that are no good frame: then the one that asked has the token, else
+        the one that sends. Nobody is known to have it."""
+        alone = header.role is Role.REQUEST or frame.octets[2] in (_TOKEN, _POLL)
+        return not alone and header.destination != BROADCAST
+
+    def _answers_unread(self, asker: int) -> None:
+        """An answer that only comes at once, behind octets that are no good frame: they were the question, and who
+        asked it has the token."""
+        if asker != self._holder:
+            self._forget()
+            self._holder = asker
+        else:
+            self._passed_by = self._token = None
+
     def _hold_unseen(self, holder: int) -> None:
         """A station has the token, and it is not known since when."""
         self._holder, self._passed_by, self._token, self._got = holder, None, None, None
@@ -259,6 +279,7 @@ class TokenWatch:
         self._second.passed(destination)
         self._unheard.heard(destination)
         self._holder, self._passed_by, self._token = destination, source, frame
+        self._disturbed = False
 
     def _late(self, what: RingEventKind, no: int, frame: Frame, mac: int, other: int | None, value: int) -> None:
         """Something was late, unless the next frame shows that the read was."""

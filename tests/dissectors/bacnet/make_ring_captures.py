@@ -14,6 +14,11 @@ from tests.dissectors.bacnet.ring_script import Step, data, found, poll, rounds,
 
 READ = "0104000301 0c0c020004d2194d".replace(" ", "")
 VALUE = "010030010c0c020004d2194d3e75030041313f"
+LIST = "01040002010c0c020000051 94c".replace(" ", "")
+_OBJECT = "c400800000"
+SEGMENTS = (f"01043c0100010c0c02000005194c3e{_OBJECT * 6}", f"0104380101010c{_OBJECT * 4}3f")
+"""A list of objects in two segments."""
+
 I_AM = "01001000c4020000c82201e09100225d"
 _HEAD = "#!sniff-capture 1\n# line: 38400,8N1\n# protocol: mstp\n# start: 2026-03-01T10:00:00Z\n"
 
@@ -189,6 +194,51 @@ def station_not_heard() -> list[Step]:
     return [(2, token(8, 27)), *[(6, token(61, 8)), (2, token(8, 27))] * 30]
 
 
+def segments_that_ask() -> list[Step]:
+    """Segments of an answer are sent as frames that expect a reply, and acknowledged at once, without the token."""
+    steps: list[Step] = []
+    for _ in range(4):
+        steps += [*rounds(3, 12, 31), (2, data(12, 31, LIST, expects=True)), (2, frame(7, 12, 31)), (2, token(12, 31))]
+        steps += [(2, data(31, 12, SEGMENTS[0], expects=True)), (4, data(12, 31, "0100400100" + "01"))]
+        steps += [
+            (2, data(31, 12, SEGMENTS[1], expects=True)),
+            (4, data(12, 31, "0100400101" + "01")),
+            (2, token(31, 12)),
+        ]
+    return steps
+
+
+def questions_not_understood() -> list[Step]:
+    """Requests of 31 whose header only the listener got damaged; they are answered as if nothing had been."""
+    steps: list[Step] = []
+    asked = data(31, 12, READ, expects=True)
+    for at in (2, 4, 7):
+        steps += [*rounds(4, 12, 31, 40), (2, token(12, 31)), (2, spoil(asked, at)), (18, data(12, 31, VALUE))]
+        steps += [(2, token(31, 40)), (2, token(40, 12)), *rounds(4, 12, 31, 40)]
+        steps += [
+            (2, token(12, 31)),
+            (2, spoil(asked, at)),
+            (5, frame(7, 31, 12)),
+            (2, token(31, 40)),
+            (2, token(40, 12)),
+        ]
+    return steps
+
+
+def last_two_octets_missing() -> list[Step]:
+    """31 lets go two octets early where it answers polls; it comes into no ring."""
+    steps: list[Step] = []
+    for _ in range(5):
+        steps += [
+            *rounds(4, 12, 20),
+            (2, token(12, 20)),
+            (2, poll(20, 31)),
+            (2, found(31, 20)[:-2]),
+            (24, token(20, 12)),
+        ]
+    return steps + rounds(4, 12, 20)
+
+
 MADE = {
     "ms-tp-token-used-after-it-was-given-up": used_late,
     "ms-tp-token-and-its-repeat-both-used": used_twice,
@@ -211,6 +261,9 @@ MADE = {
     "ms-tp-station-not-heard": station_not_heard,
     "ms-tp-request-heard-damaged": request_damaged,
     "ms-tp-damage-after-a-poll-to-nobody": after_an_empty_poll,
+    "ms-tp-segments-that-ask": segments_that_ask,
+    "ms-tp-questions-not-understood-here": questions_not_understood,
+    "ms-tp-last-two-octets-missing": last_two_octets_missing,
 }
 
 
