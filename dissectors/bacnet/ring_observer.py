@@ -175,6 +175,8 @@ class MstpRingObserver(TokenWatch):
         self._questions.holder, asked = self._holder, self._questions.asked
         answers = self._questions.is_answer(no, frame, frame_type, source, destination, node)
         check_addresses(tally, no, frame, frame_type, source, destination)
+        if source != self._holder:
+            self._disturbed = True
         if self._doubt and not answers and frame_type in AT_ONCE:
             self._answers_unread(destination)
         if frame_type == _TOKEN:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from dissectors.bacnet import message as messages
 from dissectors.bacnet.frame_types import CARRIES_NPDU, PROPRIETARY, FrameType
 from dissectors.bacnet.held_reads import HeldReads, surely_over
-from dissectors.bacnet.limits import MS, T_NO_TOKEN, T_REPLY_DELAY, T_USAGE_DELAY
+from dissectors.bacnet.limits import MAX_MASTER, MS, T_NO_TOKEN, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.message import data_of, more_follows
 from dissectors.bacnet.ring import RingEvent, RingEventKind
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
@@ -86,6 +86,16 @@ class RingQuestions:
             return False
         return self._is_late(no, frame, source, destination)
 
+    def is_searching(self, frame: Frame) -> bool:
+        """Whether a frame goes on with the search of the newest poll, to the next address: no station that has lost the
+        token begins there."""
+        asked, octets = self.asked, frame.octets
+        if asked is None or asked.frame_type != _POLL or octets[2] != _POLL or octets[4] != asked.source:
+            return False
+        ways = {(asked.destination + 1) % (MAX_MASTER + 1), 0}  # Max_Master may be less
+        following = {at + 1 if at == asked.source else at for at in ways}
+        return octets[3] in following and octets[3] != asked.source + 1
+
     def give_up(self, no: int, frame: Frame, source: int) -> None:
         """Nobody answered, and after a long silence `source` begins anew."""
         asked, self.asked = self.asked, None
@@ -153,10 +163,10 @@ class RingQuestions:
         node.poll_wait.add(took)
         if surely_over(frame, asked.frame, T_USAGE_DELAY):
             node.polls_waited += 1
-        if surely_over(frame, asked.frame, T_GO_ON):
-            self._reads.add(
-                RingEvent(RingEventKind.SLOW_SEARCH, frame.start, no, asked.source, asked.destination, took)
-            )
+        if surely_over(
+            frame, asked.frame, T_GO_ON
+        ):  # told where half of all are so: no computer reads that late so often
+            self._tally.note(RingEventKind.SLOW_SEARCH, frame.start, no, asked.source, asked.destination, took)
         since, same = self.alone_since, frame.octets == asked.frame.octets
         if since is None or took < self._reads.least_gap or self.doubt or same:
             return

@@ -41,7 +41,7 @@ class TokenWatch:
         self._holder: int | None = None  # None: not known
         self._passed_by: int | None = None  # who passed the token to the holder, while the holder has not used it
         self._token: Frame | None = None  # that token, while unused
-        self._disturbed = False  # octets that are no good frame came since then: they may have been its use
+        self._disturbed = False  # since then others spoke, or octets came that may have been its use
         self._second = SecondTokens(self._tally)
         self._repeated = RepeatedToken()
         self._got: int | None = None  # when the holder got the token
@@ -62,11 +62,19 @@ class TokenWatch:
         it: no other cause of so long a silence leaves a token to anybody, while a second one is not proved by it.
         """
         silence = self._silence(frame)
+        if silence + self._quiet_slack >= T_NO_TOKEN and self._goes_on_slowly(frame, source):
+            return False
         if silence - frame.slack >= T_NO_TOKEN:
             return True
         if self._holder is None or source in (self._holder, self._passed_by):
             return False
         return silence + self._quiet_slack >= T_NO_TOKEN
+
+    def _goes_on_slowly(self, frame: Frame, source: int) -> bool:
+        """Whether who has the token goes on with its search, or after a token to itself, however late."""
+        if source != self._holder:
+            return False
+        return self._questions.is_searching(frame) or self._passed_by == source
 
     def _lose_token(self, no: int, frame: Frame, source: int) -> None:
         tally = self._tally
