@@ -86,6 +86,10 @@ class RingQuestions:
             return False
         return self._is_late(no, frame, source, destination)
 
+    def awaits(self, source: int) -> bool:
+        """Whether it is the turn of `source`, which was asked."""
+        return self.asked is not None and self.asked.destination == source
+
     def is_searching(self, frame: Frame) -> bool:
         """Whether a frame goes on with the search of the newest poll, to the next address: no station that has lost the
         token begins there."""

@@ -68,6 +68,8 @@ class TokenWatch:
             return True
         if self._holder is None or source in (self._holder, self._passed_by):
             return False
+        if self._tally.timing.latency >= T_NO_TOKEN or self._questions.awaits(source):
+            return False
         return silence + self._quiet_slack >= T_NO_TOKEN
 
     def _goes_on_slowly(self, frame: Frame, source: int) -> bool:

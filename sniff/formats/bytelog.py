@@ -30,7 +30,7 @@ from sniff.engine.capture import CaptureError
 from sniff.engine.session import Adapter, Completeness, Item, LineEvent, Session
 from sniff.formats.contents import utf16_of
 from sniff.formats.files import explain, open_capture
-from sniff.formats.log_assembly import Assembly
+from sniff.formats.log_assembly import LINE_END, SLOW, Assembly
 from sniff.formats.log_lines import Kind, pieces
 from sniff.formats.log_margin import plain_signs
 from sniff.formats.log_plan import LOOKED_AT, LOOKED_AT_CHARACTERS, Plan, plan_of
@@ -55,7 +55,8 @@ _RULED = re.compile(r"[\s+|:=-]*")
 """What stands between the rows of a table that is drawn."""
 
 TIMELESS = 50 * MS
-"""What may lie between two octets of one frame where there are no times: LINE_END, and what a faster line leaves."""
+"""What may lie between two octets of one frame where there are no times: LINE_END, and what a faster line leaves of so
+many octets as most lines have; more where a line is longer."""
 
 KNOWN = (
     "lines of pairs, numbers, 0x.., [..], \\x.. or characters, with and without times and directions; hexdumps; "
@@ -151,10 +152,11 @@ class ByteLog:
 
     def _adapter(self, lines: list[str], adapter: Adapter) -> Adapter:
         assert self._plan is not None
-        read = map(self._plan.line, self._plan.margin.joined(lines))
+        read = list(map(self._plan.line, self._plan.margin.joined(lines)))
         stamps = [line.stamp for line in read if line.stamp is not None]
         if not stamps:
-            return replace(adapter, latency=TIMELESS, latency_from="assumed; the log has no times")
+            longest = LINE_END + max((len(line.octets) for line in read), default=0) * SLOW.char
+            return replace(adapter, latency=max(TIMELESS, longest), latency_from="assumed; the log has no times")
         tick = min(stamp.tick for stamp in stamps)
         if tick <= FOREIGN_LATENCY:
             return adapter

@@ -41,7 +41,7 @@ class Assembly:
     def __init__(self, plan: Plan, line: LineSettings) -> None:
         self.was = Kind.EMPTY
         self._plan = plan
-        self._char = max(line.char, SLOW.char)
+        self._char, self._own_char = max(line.char, SLOW.char), line.char
         self._bit = 1_000_000_000 / line.baud
         self._recent = b""
         self._last = 0
@@ -254,7 +254,7 @@ class Assembly:
         if self._whole is not None and self._whole(octets) != octets:
             octets = self._whole(octets)
             self.completed += 1
-        length = len(octets) * self._char
+        length = len(octets) * (self._own_char if self._glued else self._char)  # no silence, however fast the line
         silence = 0 if self._glued or self._plan.width is not None else LINE_END
         self._glued = False
         follows = self._last + length + (silence if self._any else 0)
