@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from dissectors.frame import Frame
 from dissectors.histogram import Histogram, add_grouped
 from dissectors.tracker import PASSING, Passing, Transaction, Verdict
+from sniff.analysis.poll import ANSWERS
 from sniff.engine.engine import Row
 
 if TYPE_CHECKING:
@@ -51,6 +52,11 @@ class Node:
             return 0
         late = min(self.verdicts[Verdict.LATE], self.verdicts[Verdict.NO_RESPONSE])
         return sum(self.verdicts[verdict] for verdict in EXPECTING) - late
+
+    @property
+    def answered(self) -> int:
+        """Those of them that got what they asked for, in time."""
+        return sum(self.verdicts[verdict] for verdict in ANSWERS)
 
     @property
     def unanswered(self) -> int:

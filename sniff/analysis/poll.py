@@ -73,10 +73,10 @@ class Slices:
 class Poll:
     """All requests of one entry. Times are ns.
 
-    `asked`: requests, repeats not among them (`repeats`); `verdicts`: of both; `late`: answers that came too late, of
-    those without. `first`, `last`: begin of the first and of the last request; `newest`: of the last that is no repeat.
-    `every`: from one request to the next, without repeats; `between`: with them. `latency`: of answers. `slices`: how
-    many were asked when, without repeats.
+    `asked`: requests, repeats not among them (`repeats`); `verdicts`: of both; `late`: answers that came too late, to
+    requests that stand in `verdicts` as without. `first`, `last`: begin of the first and of the last request;
+    `newest`: of the last that is no repeat. `every`: from one request to the next, without repeats; `between`: with
+    them. `latency`: of answers. `slices`: how many were asked when, without repeats.
     """
 
     key: PollKey
@@ -126,8 +126,8 @@ class Poll:
 
     @property
     def unanswered(self) -> int:
-        """Requests to which nothing came in time."""
-        return self.verdicts[Verdict.NO_RESPONSE]
+        """Requests to which nothing came, not even late."""
+        return max(0, self.verdicts[Verdict.NO_RESPONSE] - self.late)
 
     @property
     def damaged(self) -> int:

@@ -229,17 +229,16 @@ def _health(health: HealthReport, word: str) -> list[tuple[Cell, ...]]:
 
 
 def _node(node: Node) -> tuple[Cell, ...]:
-    by_name = {verdict.value: count for verdict, count in node.verdicts.items()}
     return (
         node.address,
         node.sent,
         node.received,
         node.asked,
-        by_name.get("answered", 0) + by_name.get("retry", 0),
-        by_name.get("exception", 0),
-        by_name.get("no-response", 0),
-        by_name.get("late", 0),
-        by_name.get("answered-twice", 0),
+        node.answered,
+        node.verdicts[Verdict.EXCEPTION],
+        node.unanswered,
+        node.verdicts[Verdict.LATE],
+        node.verdicts[Verdict.ANSWERED_TWICE],
         node.damaged,
         *_quantiles(node.latency)[2:],
     )

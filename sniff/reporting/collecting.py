@@ -168,13 +168,14 @@ def _station(node: Node, kinds: Counter[str], health: Health | None) -> StationN
     trouble = dict(kinds.most_common())
     if node.damaged:
         trouble["damaged frame"] = node.damaged
-    failed = sum(node.verdicts[verdict] for verdict in (Verdict.NO_RESPONSE, Verdict.LATE, Verdict.DAMAGED_ANSWER))
     return StationNumbers(
         address=node.address,
         sent=node.sent,
         received=node.received,
         asked=node.asked,
-        answered=node.asked - failed,
+        answered=node.answered,
+        exceptions=node.verdicts[Verdict.EXCEPTION],
+        unanswered=node.unanswered,
         damaged=node.damaged,
         health=None if health is None else _score(health),
         trouble=trouble,

@@ -86,13 +86,18 @@ def _ms(value: int | None) -> float | None:
 
 @dataclass(frozen=True, slots=True)
 class StationNumbers:
-    """One station: frames from and to it, what became of requests to it, how long it took."""
+    """One station: frames from and to it, what became of requests to it, how long it took.
+
+    `answered`: in time; `unanswered`: not even late.
+    """
 
     address: int
     sent: int
     received: int
     asked: int
     answered: int
+    exceptions: int
+    unanswered: int
     damaged: int
     health: Score | None
     trouble: Mapping[str, int]
