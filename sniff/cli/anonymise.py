@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 
 from sniff.cli import USAGE, Failure, arguments, writing
+from sniff.cli.incomplete import say_incomplete
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -28,5 +29,5 @@ def run(args: argparse.Namespace) -> int:
         raise Failure(f"anonymise: does not know where {session.protocol} keeps addresses and texts", USAGE)
     items = writing.Items(anonymising.anonymised(capture.items(), session))
     writing.write(args, anonymising.anonymous_session(session), items, [args.file])
-    writing.say_incomplete(args.file, capture)
+    say_incomplete(args.file, capture)
     return 0

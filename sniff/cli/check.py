@@ -20,7 +20,6 @@ from sniff.bus.site import site_bus, site_name
 from sniff.cli import (
     INTERRUPTED,
     PORT_TROUBLE,
-    UNREADABLE,
     USAGE,
     Failure,
     arguments,
@@ -29,6 +28,7 @@ from sniff.cli import (
     watching,
 )
 from sniff.cli.check_output import Checked
+from sniff.cli.incomplete import say_why
 from sniff.cli.interruption import until_interrupted
 from sniff.cli.progress import Watched
 from sniff.engine.capture import Capture
@@ -91,6 +91,10 @@ def run(args: argparse.Namespace) -> int:
         check_output.write_json(checked)
     else:
         check_output.write_text(checked, colour)
+    if args.format != "text":  # which has it where it belongs
+        for one in found:
+            if one.note:
+                say_why(one.source, one.note)
     failing = fail_on is not None and any(check_output.failures(one.findings, fail_on) for one in checked)
     return int(failing)
 
@@ -104,7 +108,8 @@ def _check(args: argparse.Namespace) -> list[Checked]:
         return [_read(name, capture, args, sites[site_name(name)] > 1) for name, capture in opened]
     source = ports[0]
     if not watching.is_port(source) and ("." in source or "/" in source):
-        raise Failure(f"{source}: no such file", UNREADABLE)
+        arguments.open_captures([source])  # says what it is instead
+
     if len(args.sources) > 1:
         raise Failure(f"{source}: a port is checked alone; files end in {', '.join(suffixes())}", USAGE)
     if args.filter:

@@ -12,6 +12,7 @@ from sniff.bus.capture_writer import MICROSECONDS
 from sniff.bus.marked_rows import MarkedRows
 from sniff.bus.offline import survey
 from sniff.cli import USAGE, Failure, arguments, filtering, writing
+from sniff.cli.incomplete import say_incomplete
 from sniff.cli.progress import Watched
 from sniff.devices import with_devices
 from sniff.engine.capture import Capture
@@ -52,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
         from sniff.cli import frame_table
 
         frame_table.write(args, capture, session, arguments.noted_devices(args, session))
-        writing.say_incomplete(args.source, capture)
+        say_incomplete(args.source, capture)
         return 0
     options = {"link-type": str(args.link_type)} if args.link_type is not None else {}
     if args.microseconds:
@@ -65,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     notes, marks = _evidence(capture, session, devices, args.reference) if noted else (None, None)
     source = filtering.sifted(args, capture, session, devices)
     writing.write(args, session, source, [args.source], options or None, devices=devices, notes=notes, marks=marks)
-    writing.say_incomplete(args.source, capture)
+    say_incomplete(args.source, capture)
     return 0
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 
 from sniff.cli import USAGE, Failure, arguments, filtering, writing
+from sniff.cli.incomplete import say_incomplete
 from sniff.cli.progress import Watched
 
 
@@ -54,5 +55,5 @@ def run(args: argparse.Namespace) -> int:
     count = writing.write(args, session, cutting.CutOut(source, stretch, session.line.char), [args.file])
     if not count:
         raise Failure(f"{args.file}: nothing in that stretch; {args.output} is empty", USAGE)
-    writing.say_incomplete(args.file, capture)
+    say_incomplete(args.file, capture)
     return 0

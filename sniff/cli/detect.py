@@ -8,15 +8,13 @@ code 0 when found, 3 when not.
 from __future__ import annotations
 
 import argparse
-import stat
 from dataclasses import replace
-from pathlib import Path
 
 from dissectors import registry
 from sniff.analysis.autodetect import Candidature, Ending, Outcome, sureness
 from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.told_protocol import Sureness, detected, told_by
-from sniff.cli import PORT_TROUBLE, UNREADABLE, arguments, json_output, listening, targets
+from sniff.cli import PORT_TROUBLE, UNREADABLE, arguments, json_output, listening, targets, watching
 from sniff.cli.searching import TIMEOUT, search, sentence
 from sniff.engine.session import AUTO, Session, with_settings
 
@@ -42,7 +40,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Search, and say what was found."""
-    if is_file(args.port):
+    if watching.is_file(args.port):
         return of_file(args)
     args.line, args.protocol = args.line or AUTO, args.protocol or AUTO
     target = targets.target_of(args)
@@ -54,14 +52,6 @@ def run(args: argparse.Namespace) -> int:
     else:
         write(args.port, outcome)
     return 0 if outcome.ending is Ending.FOUND else PORT_TROUBLE
-
-
-def is_file(name: str) -> bool:
-    """Whether it is a capture and no port."""
-    try:
-        return name == "-" or stat.S_ISREG(Path(name).stat().st_mode)
-    except (OSError, ValueError):
-        return False
 
 
 def of_file(args: argparse.Namespace) -> int:

@@ -10,7 +10,8 @@ import argparse
 from sniff.analysis.summary import Summary
 from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
-from sniff.cli import arguments, filtering, tables, writing
+from sniff.cli import arguments, filtering, tables
+from sniff.cli.incomplete import say_incomplete
 from sniff.cli.progress import Watched
 from sniff.devices import noted_devices
 from sniff.engine.follow_settings import dissector_for
@@ -41,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
         model = BusModel(session, dissector_for(session), said.over(noted_devices(session)))
         survey(Watched(capture), session, model, reference=args.reference)
         arguments.say_assumed(session, path)
-        writing.say_incomplete(path, capture)
+        say_incomplete(path, capture)
         summary, points = model.summary, tuple(model.points)
         if args.filter:
             counted = BusModel(session, dissector_for(session), model.devices)

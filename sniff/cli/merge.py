@@ -9,6 +9,7 @@ from collections import Counter
 from dissectors.findings import counted
 from dissectors.frame import Chunk
 from sniff.cli import UNREADABLE, Failure, arguments, writing
+from sniff.cli.incomplete import say_incomplete
 from sniff.engine.capture import CaptureError
 
 
@@ -35,5 +36,5 @@ def run(args: argparse.Namespace) -> int:
     if shared[Chunk]:
         print(f"sniff485: {counted(shared[Chunk], 'read')} in more than one capture, written once", file=sys.stderr)
     for path, capture in opened:
-        writing.say_incomplete(path, capture)
+        say_incomplete(path, capture)
     return 0

@@ -23,6 +23,7 @@ from sniff.bus.offline import outputs
 from sniff.bus.row_words import iso
 from sniff.bus.sample_row import COLUMNS, sample_row, shown_value
 from sniff.cli import USAGE, Failure, arguments, filtering, tables, watching, writing
+from sniff.cli.incomplete import say_incomplete
 from sniff.cli.interruption import until_interrupted
 from sniff.cli.progress import Watched
 from sniff.cli.tables import Cell
@@ -102,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
             for samples in _chosen(args, capture, session):
                 for sample in samples.in_order():
                     table.add(sample_row(sample))
-            writing.say_incomplete(name, capture)
+            say_incomplete(name, capture)
     return 0
 
 
@@ -115,7 +116,7 @@ def _print(args: argparse.Namespace) -> int:
         else:
             chosen = (cells for samples in _chosen(args, capture, session) for cells in _cells(samples))
             tables.write(SAMPLES, chosen, args.style)
-        writing.say_incomplete(path, capture)
+        say_incomplete(path, capture)
     return 0
 
 

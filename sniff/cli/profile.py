@@ -21,6 +21,7 @@ from dissectors.profiles.parsing import is_name
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.offline import survey
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, register_maps, tables, writing
+from sniff.cli.incomplete import say_incomplete
 from sniff.cli.progress import Watched
 from sniff.devices import UnknownProfile, available, find, read
 from sniff.engine.follow_settings import dissector_for
@@ -265,7 +266,7 @@ def _guess(args: argparse.Namespace) -> int:
         guesses = list(guessing.guesses(profiles))
         rows += [(guess.station, guess.profile.name, f"{guess.score:.0%}", guess.why) for guess in guesses]
         _say_ties(guesses)
-        writing.say_incomplete(path, capture)
+        say_incomplete(path, capture)
     tables.write(("station", "profile", "fits", "why"), rows, "json" if args.json else "text")
     return 0
 
@@ -289,7 +290,7 @@ def _draft(args: argparse.Namespace) -> int:
             raise Failure(f"{held}: registers of one family of protocols make a profile; draft one at a time", USAGE)
         protocols[dissector.name] = None
         survey(Watched(capture), session, series.of(dissector), reference=args.reference)
-        writing.say_incomplete(path, capture)
+        say_incomplete(path, capture)
     found = [one for one in guessed(series.blocks(), series.written) if args.table in (None, one.space)]
     stations = sorted({one.device for one in found})
     if args.station is None and len(stations) > 1:

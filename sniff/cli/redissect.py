@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 
 from sniff.cli import USAGE, Failure, arguments, writing
+from sniff.cli.incomplete import say_incomplete
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -26,5 +27,5 @@ def run(args: argparse.Namespace) -> int:
     capture = arguments.open_capture(args.file)
     session = arguments.settings_of(args, capture.session, args.file)
     writing.write(args, session, capture, [args.file], with_frames=True)
-    writing.say_incomplete(args.file, capture)
+    say_incomplete(args.file, capture)
     return 0

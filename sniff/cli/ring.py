@@ -22,17 +22,15 @@ def ring_of(source: ReadSource, session: Session, shown: TokenRing, reference: b
 
 def show_stations(
     source: ReadSource, session: Session, shown: TokenRing, table: StationTable, args: argparse.Namespace
-) -> int:
+) -> None:
     """Print the stations that do not pass the token. Raises CaptureError as the source does."""
     ring = ring_of(source, session, shown, args.reference)
     tables.write(table.headings, table.rows(ring), args.style)
-    return 0
 
 
-def show(source: ReadSource, session: Session, shown: TokenRing, style: str, reference: bool) -> int:
+def show(source: ReadSource, session: Session, shown: TokenRing, style: str, reference: bool) -> None:
     """Print the ring; the sentences only as text. `reference`: see `survey`. Raises CaptureError as the source does."""
     write(ring_of(source, session, shown, reference), shown, style)
-    return 0
 
 
 def write(ring: Any, shown: TokenRing, style: str) -> None:

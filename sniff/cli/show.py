@@ -16,6 +16,7 @@ from sniff.bus import row_words as rows
 from sniff.bus.offline import settled_columns
 from sniff.bus.second_proof import SecondProof
 from sniff.cli import USAGE, Failure, arguments, filtering, standard_streams, writing
+from sniff.cli.incomplete import say_incomplete
 from sniff.cli.listed_rows import ListedRows
 from sniff.cli.progress import Watched
 from sniff.cli.tables import Cell, plain_cell
@@ -94,7 +95,7 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
             left = _show_in_bulk(args, capture, session, proof, wanted, left, table)
             if proof.name and left != 0:
                 left = _show(args, listed.of_both(spoken), session, ours, left, table)
-        writing.say_incomplete(path, capture)
+        say_incomplete(path, capture)
         if left == 0:
             break
     return 0

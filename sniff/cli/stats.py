@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,6 +26,7 @@ from sniff.analysis.wording import station_word
 from sniff.bus.offline import survey
 from sniff.bus.row_words import iso
 from sniff.cli import USAGE, Failure, arguments, filtering, tables, watching
+from sniff.cli.incomplete import say_incomplete
 from sniff.cli.interruption import until_interrupted
 from sniff.cli.progress import Watched
 from sniff.cli.tables import Cell
@@ -36,6 +38,7 @@ from sniff.engine.session import LineEvent, Session
 if TYPE_CHECKING:
     from sniff.analysis.health import HealthReport
     from sniff.bus.model import BusModel
+    from sniff.engine.capture import Capture
     from sniff.engine.table import Table
 
 TABLES = ("nodes", "health", "transactions", "latency", "load", "ring", "stations", "polls")
@@ -74,6 +77,14 @@ def run(args: argparse.Namespace) -> int:
         hint = "; values have a command of their own: points" if "points" in stray else ""
         raise Failure(f"{stray[0]}: neither a file nor a table; tables are {', '.join(TABLES)}{hint}", USAGE)
     opened = arguments.open_captures(files)
+    _of_captures(args, table, opened)
+    for name, capture in opened:
+        say_incomplete(name, capture)
+    return 0
+
+
+def _of_captures(args: argparse.Namespace, table: str, opened: Sequence[tuple[str, Capture]]) -> None:
+    """Print a table of captures of one bus together."""
     captures = [capture for _, capture in opened]
     names = [name for name, _ in opened]
     session = arguments.settings_of(args, merged_session(captures, names), names[0])
@@ -90,25 +101,24 @@ def run(args: argparse.Namespace) -> int:
         from sniff.cli import ring
 
         if table == "stations" and shown.stations is not None:
-            return ring.show_stations(Watched(source), session, shown, shown.stations, args)
-        return ring.show(Watched(source), session, shown, args.style, args.reference)
-    if table == "health":
+            ring.show_stations(Watched(source), session, shown, shown.stations, args)
+        else:
+            ring.show(Watched(source), session, shown, args.style, args.reference)
+    elif table == "health":
         devices = arguments.noted_devices(args, session)
         from sniff.bus.model import BusModel  # with the rules: other tables count only
 
         model = BusModel(session, dissector_for(session), devices, with_points=False)
         survey(Watched(source), session, model, reference=args.reference)
         tables.write(HEALTH_HEADINGS, _health(model.health(), station_word(session.protocol)), args.style)
-        return 0
-    if table == "polls":
+    elif table == "polls":
         from sniff.cli import polls
 
         polls.show(args, Watched(source), session)
-        return 0
-    summary, kinds = Summary(session.line), _Kinds()
-    filtering.surveyed(args, source, session, summary, kinds)
-    _write(args, table, summary, kinds, session)
-    return 0
+    else:
+        summary, kinds = Summary(session.line), _Kinds()
+        filtering.surveyed(args, source, session, summary, kinds)
+        _write(args, table, summary, kinds, session)
 
 
 def _write(args: argparse.Namespace, table: str, summary: Summary, kinds: _Kinds, session: Session) -> None:

@@ -16,12 +16,12 @@ from dissectors.profiles import Devices
 from sniff.analysis.sanitizing import sanitized
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.cli.progress import Watched
-from sniff.engine.capture import BlockWriter, Capture, CaptureError, CaptureWriter
+from sniff.engine.capture import BlockWriter, CaptureError, CaptureWriter
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for, engine_for
 from sniff.engine.read_source import ReadSource
 from sniff.engine.session import Item, LineEvent, Session
-from sniff.formats import cut_capture, parquet
+from sniff.formats import parquet
 from sniff.formats.parquet import Kind, ParquetWriter
 
 if TYPE_CHECKING:
@@ -100,15 +100,6 @@ def parquet_file(args: argparse.Namespace, columns: Mapping[str, Kind]) -> Abstr
     target = Path(args.parquet)
     refuse_to_overwrite(target, args.files, args.force)
     return parquet.ParquetWriter(target, columns)
-
-
-def say_incomplete(path: str, capture: Capture) -> None:
-    """Where a capture that was read ends too early; after what was printed of it."""
-    complete = capture.completeness()
-    if not complete.whole:
-        sys.stdout.flush()
-        print(f"sniff485: {sanitized(path)}: {sanitized(complete.text)}", file=sys.stderr)
-        cut_capture.said(path)
 
 
 @dataclass(slots=True)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from sniff.cli import main
+from tests.sniff.cli.conftest import Ran
 
 CAPTURES = Path(__file__).parents[3] / "captures"
 LOG = "".join(
@@ -37,3 +39,9 @@ def test_octets_that_are_nothing_are_not_found(tmp_path: Path, capsys: pytest.Ca
     path.write_text("RX 11 22 33 44 55 66 77 88\n" * 5)
     assert main(["detect", str(path)]) == 3
     assert "no protocol makes good frames" in capsys.readouterr().out
+
+
+def test_a_file_that_is_not_there_is_no_port_trouble(tmp_path: Path, sniff485: Callable[..., Ran]) -> None:
+    ran = sniff485("detect", tmp_path / "night.mcap")
+    assert (ran.code, ran.out) == (3, "")
+    assert "no such file" in ran.err
