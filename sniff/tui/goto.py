@@ -33,8 +33,7 @@ def _time(store: Store, text: str) -> int | None:
     if not len(store):
         return None
     if after is not None:
-        first = store.load.first
-        return (first or 0) + int(after[1][:9]) * NS_PER_S + _fraction(after[2])
+        return store.session.started + int(after[1][:9]) * NS_PER_S + _fraction(after[2])
     assert clock is not None
     first = store.rows[0].event.start
     day = datetime.fromtimestamp(first // NS_PER_S)

@@ -61,6 +61,6 @@ class StoreList(LineList):
         if mode is TimeMode.ABSOLUTE:
             return clock(start)
         if mode is TimeMode.RELATIVE:
-            passed = start - (self.store.load.first or start)
+            passed = start - self.store.session.started  # as every command counts
             return seconds(passed, 6 if passed < DAY else 3)
         return seconds(0 if before is None else start - before)

@@ -40,7 +40,7 @@ class TimeMode(Enum):
 _TITLES = {TimeMode.ABSOLUTE: "time", TimeMode.RELATIVE: "s from start", TimeMode.DELTA: "s from last"}
 _WORDS = {
     TimeMode.ABSOLUTE: "time of day",
-    TimeMode.RELATIVE: "seconds since the first row",
+    TimeMode.RELATIVE: "seconds since the capture began",
     TimeMode.DELTA: "seconds since the row above began",
 }
 

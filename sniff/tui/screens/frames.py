@@ -44,7 +44,6 @@ class FramesScreen(ListingScreen):
     """List, tree and hex dump, linked both ways."""
 
     TITLE = "Frames"
-    THINGS = "frames"
     CSS_PATH = "frames.tcss"
     HORIZONTAL_BREAKPOINTS: ClassVar[list[tuple[int, str]]] = [  # type: ignore[misc]  # textual's is no plain ClassVar
         (0, "-tiny"),

@@ -45,7 +45,7 @@ class ListingScreen(SearchScreen):
         Binding("C", "columns", "columns", tooltip="choose the columns of this list and their order", show=False),
         Binding("V", "view", "view", tooltip="a view by its name, or save what is shown as one", show=False),
         Binding("f", "app.follow", "follow", tooltip="follow the newest row, or stay"),
-        Binding("t", "app.time", "time", tooltip="time of day, since the first row, or since the row before"),
+        Binding("t", "app.time", "time", tooltip="time of day, since the capture began, or since the row before"),
         Binding("d", "data", "data", tooltip="data only: hide tokens and polls, or show them again", show=False),
         Binding("escape", "leave", "clear", tooltip="back to the list; there: remove the filter", show=False),
         Binding("e", "error(1)", "error", tooltip="next error"),

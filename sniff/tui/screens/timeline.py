@@ -44,10 +44,12 @@ LEAST_AXIS = 0.1
 
 
 class Column(NamedTuple):
-    """Some seconds of the bus drawn as one character. `begin`: s since the epoch."""
+    """Some seconds of the bus drawn as one character. `begin`: s since the epoch; `load`: of all its time, `share`: of
+    what the capture covers of that, which is less where it begins and ends."""
 
     begin: int
     load: float
+    share: float
     frames: int
     damaged: int
     noise: int
@@ -68,7 +70,8 @@ def columns(store: Store, begin: int, width: int, zoom: int) -> list[Column]:
         )
         failed = _failed(store, at, at + zoom) if parts else 0
         load = min(1.0, together.busy / (zoom * NS_PER_S))
-        made.append(Column(at, load, together.frames, together.damaged, together.noise, failed))
+        share = store.load.share_of(together, at * NS_PER_S, (at + zoom) * NS_PER_S)
+        made.append(Column(at, load, share, together.frames, together.damaged, together.noise, failed))
     return made
 
 
@@ -211,7 +214,7 @@ class TimelineScreen(ViewScreen):
         if column is None:
             return ""
         words = (
-            f"{clock(column.begin * NS_PER_S)[:8]} + {seconds_in_words(zoom)}: load {column.load:.1%}, "
+            f"{clock(column.begin * NS_PER_S)[:8]} + {seconds_in_words(zoom)}: load {column.share:.1%}, "
             f"{counted(column.frames, 'frame')}, {counted(column.failed, 'error')}, {column.damaged} damaged, "
             f"{counted(column.noise, 'octet')} of noise"
         )

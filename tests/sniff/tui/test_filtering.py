@@ -38,7 +38,7 @@ def test_validity_is_said_while_typing(look: Any, busy_bus: Any) -> None:
         await see.press("enter")
         assert shown(see) == [1, 9, 11]
         assert "filter: dst == 1" in see.lines()[2]
-        assert "3 of 13 frames" in see.lines()[2]
+        assert "3 of 13 rows" in see.lines()[2]
 
     look(busy_bus.store, script)
 

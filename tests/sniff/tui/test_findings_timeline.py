@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from dissectors.findings import Severity
+from dissectors.line import NS_PER_S
 from dissectors.registry import get
 from dissectors.simulated_faults import LostResponse
 from sniff.bus.offline import outputs
@@ -164,6 +165,19 @@ def test_the_second_v_says_how_to_get_rid_of_its_filter(look, store):
         assert not see.app.viewing.filter
 
     look(store, script)
+
+
+def test_the_load_of_a_second_that_is_not_over_is_of_what_was_heard_of_it(look, store):
+    last = store.load.last // NS_PER_S
+    known = store.load.share_of(store.load.seconds[last], last * NS_PER_S, (last + 1) * NS_PER_S)
+    whole = store.load.seconds[last].busy / NS_PER_S
+    assert f"{known:.1%}" != f"{whole:.1%}"
+
+    async def script(see):
+        await see.press("plus", "plus", "plus", "plus", "G")
+        assert f"+ 1 s: load {known:.1%}" in see.text()
+
+    look(store, script, start="timeline")
 
 
 def test_the_timeline_shows_each_station_and_how_long_it_takes_to_answer(look, store):

@@ -343,7 +343,7 @@ def test_the_title_says_how_time_is_counted_and_how_sure_latencies_are(look: Any
             await see.press("t")
         assert [title[6:20].strip() for title in titles] == ["time", "s from start", "s from last"]
         assert all("ms ±16" in title for title in titles)
-        assert see.notices()[0] == "time: seconds since the first row"
+        assert see.notices()[0] == "time: seconds since the capture began"
         assert "(−0/+16)" not in "".join(see.lines()[2:14])
 
     look(busy_bus.store, script)

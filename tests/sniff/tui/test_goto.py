@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from dissectors.line import NS_PER_S
 from sniff.tui.goto import find
 
 
@@ -26,6 +27,23 @@ from sniff.tui.goto import find
 )
 def test_places(busy_bus: Any, text: str, row: int) -> None:
     assert find(busy_bus.store, text, busy_bus.store.last_no) == row
+
+
+def test_seconds_count_from_where_every_command_counts(make_bus: Any, look: Any) -> None:
+    """From the start of the capture, not from its first row: what `check` says at 4.1 s is found by +4.1."""
+    bus = make_bus()
+    bus.now += 4 * NS_PER_S
+    bus.ask(1)
+    bus.now += 2 * NS_PER_S
+    bus.ask(2)
+    assert find(bus.store, "+4.1", bus.store.last_no) == 3
+    assert find(bus.store, "+2.1", bus.store.last_no) == 1
+
+    async def script(see: Any) -> None:
+        await see.press("t")
+        assert "+4.000000" in see.lines()[3]
+
+    look(bus.store, script)
 
 
 def test_not_beyond_the_freeze(busy_bus: Any) -> None:

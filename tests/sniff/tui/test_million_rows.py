@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -72,7 +73,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Asked:
 @pytest.fixture
 def store_of(make_bus: Any) -> Any:
     def make(count: int) -> Store:
-        session = make_bus().store.session
+        session = replace(make_bus().store.session, started=0)
         store = Store(session, TOY, 10**7, judge_later=True)
         for first in range(1, count + 1, 50_000):
             store.add_table(made_table(first, min(50_000, count + 1 - first)))
