@@ -174,7 +174,7 @@ _ALL = (
         "frames too close together",
         "Less than 3.5 characters of silence between two good RTU frames (Modbus over Serial Line V1.02, 2.5.1.1; "
         "1.75 ms above 19200 Bd), even by the longest reading that the adapter leaves. At least three, and 1 in 10 of "
-        "the sender's frames (six and half of them where nobody said which adapter it was); not of late answers. "
+        "the sender's frames (six and two in three where nobody said which adapter it was); not of late answers. "
         "A note about the bus where all its stations, two or more, do so.",
         "strict receivers take the two for one frame and drop both",
         "the response delay of the station, or the pause of the master",

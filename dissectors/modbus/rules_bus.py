@@ -19,7 +19,6 @@ from dissectors.words import duration, fine_milliseconds
 _WASTE = 0.05
 _HABIT = 10  # a sender that is too quick is so once in so many frames at least; what a computer holds up is rarer
 _HABIT_LEAST = 6
-_MOSTLY = 2  # where nobody said how late the adapter may be: it makes as many silences longer as shorter
 _PAUSES_LEAST = 3
 _CLOSE_LEAST = 3
 _BARE_LEAST = 3
@@ -278,8 +277,12 @@ def _too_close(seen: BusRecord) -> Iterator[Finding]:
         for time, before, no in calls:
             if before not in seen.late_frames and no not in seen.late_frames:
                 tally.add(time, before, no)
-        least, often = (_CLOSE_LEAST, _HABIT) if seen.timing.is_told else (_HABIT_LEAST, _MOSTLY)
-        if tally.count >= least and often * tally.count >= seen.frames[sender]:
+        count, frames = tally.count, seen.frames[sender]
+        if seen.timing.is_told:
+            is_habit = count >= _CLOSE_LEAST and _HABIT * count >= frames
+        else:  # an adapter makes as many silences longer as shorter
+            is_habit = count >= _HABIT_LEAST and 3 * count >= 2 * frames
+        if is_habit:
             habits[sender] = tally
     limit = fine_milliseconds(seen.timing.t35)
     if len(habits) > 1 and seen.frames.keys() - habits.keys() <= {MASTER}:
