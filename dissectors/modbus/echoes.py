@@ -41,8 +41,8 @@ class Echoes:
 
     def is_of_request(self, newest: Exchange | None, seen: Seen) -> bool:
         """Whether a sure request repeats the newest one at once; a master repeats only after its timeout."""
-        if newest is None or newest.octets != seen.octets or newest.answered or newest.fault:
-            return False
+        if newest is None or newest.octets != seen.octets or newest.answered or newest.fault or newest.garble:
+            return False  # behind a damaged answer a master may repeat at once
         gap = newest.gap(seen.frame.start)
         if self._learnt.timeout is not None:
             return gap < self.limit or gap * 8 < self._learnt.timeout

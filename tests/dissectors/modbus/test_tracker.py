@@ -391,3 +391,10 @@ def test_a_write_that_takes_as_long_as_the_reads_is_an_answer_though_the_timeout
     bus.exchange(READ, VALUES, answer=174)
     reading = bus.exchange(WRITE, WRITE, answer=175).run()
     assert reading.last.verdict is Verdict.ANSWERED
+
+
+def test_a_repeat_at_once_behind_a_damaged_answer_is_no_echo(bus):
+    for _ in range(3):
+        bus.exchange("020300000001", "0203020007")
+        bus.say("010300070002").damage("01030400070009", 12).exchange("010300070002", "01030400070009", pause=14)
+    assert bus.run().verdicts == ["answered", "damaged-answer", "retry"] * 3
