@@ -20,6 +20,7 @@ class Router:
         self.dropped: Counter[int] = Counter()
         self._queues: dict[int, deque[Batch]] = {}
         self._held: Counter[int] = Counter()
+        self._has_ended = False
 
     def open(self, bus: int) -> None:
         """From now on somebody asks for this bus; what comes of others is nobody's."""
@@ -36,13 +37,15 @@ class Router:
         return given
 
     def insist(self) -> None:
-        """After the capture was asked to stop: where it says nothing any more, every bus is told that it has ended."""
-        killed = self.link.insist()
-        if killed is not None:
-            self._hand_on(killed)
+        """After the capture was asked to stop: where it says nothing any more, or who else may receive of it has ended
+        it, every bus is told that it has ended."""
+        ended = self.link.insist() or self.link.ended
+        if ended is not None and not self._has_ended:
+            self._hand_on(ended)
 
     def _hand_on(self, message: Batch) -> None:
         if isinstance(message, Ended):
+            self._has_ended = True
             for queue in self._queues.values():
                 queue.append(message)
             return

@@ -72,6 +72,7 @@ def run(args: argparse.Namespace) -> int:
     before, after = (None if each is None else int(each * 1e9) for each in (args.before, args.after))
     if not args.on and (before is not None or after is not None):
         raise Failure("--before, --after: round which trigger? say with --on FILTER or --on CODE", USAGE)
+    telling.refuse_triggers(args.on, buses)
     told_to = outlets.prepare(outlets.settings_of(args))
     record = RecordSpec(path, args.rotate, args.keep, before, after, args.keep_free)
     with until_interrupted():  # from before it begins: else it might go on with nobody who ends it

@@ -6,6 +6,8 @@ import contextlib
 import sys
 from collections.abc import Iterator, Sequence
 
+from dissectors import registry
+from dissectors.manifest import Dissector
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.triggers import Triggers
 from sniff.cli import USAGE, Failure, targets
@@ -13,15 +15,25 @@ from sniff.cli.printing import Printer
 from sniff.filter import Scope
 
 
+def refuse_triggers(words: Sequence[str], buses: Sequence[targets.Target]) -> None:
+    """Before anything begins: ends with exit code 2 for what cannot be understood of a bus whose protocol is given."""
+    for bus in buses if words else ():
+        if "protocol" not in bus.source.unknown:
+            _triggers(words, registry.get(bus.source.protocol), Scope(devices=bus.devices))
+
+
 def add_triggers(printers: Sequence[Printer], words: Sequence[str]) -> None:
     """Watch every bus for what `--on` names; ends with exit code 2 for what cannot be understood."""
     for printer in printers if words else ():
         live = printer.live
-        try:
-            printer.triggers = Triggers(words, live.dissector, Scope(live.session.started, live.devices))
-        except ValueError as error:
-            live.link.stop()
-            raise Failure(f"--on: {error}", USAGE) from None
+        printer.triggers = _triggers(words, live.dissector, Scope(live.session.started, live.devices))
+
+
+def _triggers(words: Sequence[str], dissector: Dissector, scope: Scope) -> Triggers:
+    try:
+        return Triggers(words, dissector, scope)
+    except ValueError as error:
+        raise Failure(f"--on: {error}", USAGE) from None
 
 
 @contextlib.contextmanager

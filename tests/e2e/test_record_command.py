@@ -159,6 +159,8 @@ def wait_for(path: Path) -> None:
         (["-w", "x.mcap", "--rotate", "time:1h", "--keep", "0"], 2, "'0': expected a whole number from 1 on"),
         (["-w", "x.mcap", "--count", "-3"], 2, "'-3': expected a whole number from 1 on"),
         (["-w", "x.mcap", "--duration", "0"], 2, "duration '0'"),
+        (["-w", "x.mcap", "--on", "verdict == foo"], 2, "--on: unknown verdict 'foo'"),
+        (["-w", "x.mcap", "--on", "ZZ999"], 2, "--on: ZZ999: no such rule"),
     ],
 )
 def test_what_cannot_be_recorded_to(refused, bus, tmp_path, arguments, code, words) -> None:
@@ -332,6 +334,11 @@ def test_a_rotation_that_keeps_some(run, bus, tmp_path) -> None:
     assert parts[-1] > "r-0002.mcap", "there was something to remove"
     assert parts[-1] in errors
     assert all(read(tmp_path / part).completeness().whole for part in parts)
+
+
+def test_what_cannot_fire_ends_a_capture_that_searches_its_protocol(run, bus, tmp_path) -> None:
+    code, _, errors = run("record", str(bus.link), *LINE, "-p", "auto", "-w", "x.mcap", "--on", "ZZ999")
+    assert (code, errors.splitlines()[-1]) == (2, "sniff485: --on: ZZ999: no such rule; `sniff485 rule` lists them")
 
 
 def test_a_count_ends_it(run, bus, tmp_path) -> None:

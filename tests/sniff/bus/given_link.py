@@ -18,6 +18,7 @@ class GivenLink:
         self.line = LineSettings.parse(line)
         self.priority, self.closing = "", False
         self.dropped: dict[int, int] = {}
+        self.ended: Ended | None = None
         self.told: list[tuple[Any, ...]] = []
 
     def session(self, bus: int) -> Session:
@@ -32,6 +33,9 @@ class GivenLink:
 
     def insist(self) -> Ended | None:
         return None
+
+    def ask_to_stop(self) -> None:
+        pass
 
     def let_go(self) -> None:
         pass

@@ -54,6 +54,18 @@ def test_buses_that_are_shown_by_nobody_are_left_alone() -> None:
     assert rows(LiveBus(link, 0)) == 2
 
 
+def test_a_capture_that_somebody_else_ended_has_ended_for_all() -> None:
+    """Its last word was received beside the router: no model waits for it for ever."""
+    link: Any = GivenLink(said(0, 100))
+    router = Router(link)
+    lives = [LiveBus(link, bus, router=router) for bus in (0, 1)]
+    assert rows(lives[0]) == 2
+    link.ended = Ended("stopped")
+    for live in lives:
+        live.stop()
+        assert live.ended is link.ended
+
+
 def test_the_newest_tick_says_it_all() -> None:
     link: Any = SimpleNamespace(receive_batches=lambda timeout: [Tick(0, 1), Tick(0, 2), Tick(0, 3)])
     router = Router(link)
