@@ -205,7 +205,7 @@ def _as_it_tells(session: Session) -> Session:
 def open_buses(path: str) -> list[tuple[str, Capture]]:
     """Open the buses of a file by name, each as a capture of its own; ends as `open_capture` does."""
     capture = _opened(path)
-    buses = buses_in(capture)
+    buses = buses_in(capture, path)
     return [(path, capture)] if len(buses) < 2 else [(f"{path} [{one.session.bus}]", one) for one in buses]
 
 

@@ -46,6 +46,8 @@ def run(args: argparse.Namespace) -> int:
         else:
             first = cutting.parse_time(args.since, session) if args.since else -cutting.FOREVER
             last = cutting.parse_time(args.until, session) if args.until else cutting.FOREVER
+            if first > last:
+                raise ValueError(f"--from {args.since} is after --to {args.until}")
             stretch = cutting.Stretch(first, last)
     except ValueError as error:
         raise Failure(str(error), USAGE) from None

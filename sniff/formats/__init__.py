@@ -37,10 +37,10 @@ def read(path: str | Path) -> Capture:
     if str(path) == "-":
         from sniff.formats import standard_input
 
-        return _with_reads(standard_input.read())
+        return _with_reads(standard_input.read(), path)
     if Path(path).is_dir():
         raise CaptureError(f"{path}: a directory, not a capture; name a file in it")
-    opened = _with_reads(_opened(Path(path)))
+    opened = _with_reads(_opened(Path(path)), path)
     if isinstance(opened, SeveralBuses):
         opened.buses = tuple(with_marks(one, path) for one in opened.buses)
         return opened
@@ -114,12 +114,12 @@ def start_of(path: Path) -> bytes:
         raise explain(path, error) from None
 
 
-def _with_reads(capture: Capture) -> Capture:
+def _with_reads(capture: Capture, path: Path | str) -> Capture:
     """The capture; its session knows when its first reads came, and takes no times as exact that cannot be."""
-    buses = buses_in(capture)
+    buses = buses_in(capture, path)
     if len(buses) > 1:
         for one in buses:
-            _with_reads(one)
+            _with_reads(one, path)
         return capture
     capture = buses[0]
     session = capture.session

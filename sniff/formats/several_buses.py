@@ -72,8 +72,9 @@ def chosen(name: str | None) -> Iterator[None]:
         _CHOSEN.reset(token)
 
 
-def buses_in(capture: Capture) -> list[Capture]:
-    """The buses of a file, those that were chosen. Raises CaptureError when there is none of that name."""
+def buses_in(capture: Capture, path: Path | str | None = None) -> list[Capture]:
+    """The buses of a file, those that were chosen. Raises CaptureError when there is none of that name; `path`: what
+    the file is called then."""
     name = _CHOSEN.get()
     found = list(capture.buses) if isinstance(capture, SeveralBuses) else [capture]
     if name is None or (found == [capture] and name == capture.session.bus):
@@ -83,7 +84,7 @@ def buses_in(capture: Capture) -> list[Capture]:
         return wanted
     if isinstance(capture, SeveralBuses):
         raise CaptureError(f"{capture.path}: no bus {name!r} in it; there are {capture.listed}")
-    raise CaptureError(f"{capture.session.port}: no bus {name!r} in it; there is one, {capture.session.bus!r}")
+    raise CaptureError(f"{path or capture.session.port}: no bus {name!r} in it; there is one, {capture.session.bus!r}")
 
 
 def one_or_several(path: Path, buses: Sequence[Capture]) -> Capture:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.sniff.cli.conftest import Ran
+
 
 @pytest.mark.parametrize(
     ("word", "way_out"), [("shw", "'show'"), ("chek", "'check'"), ("xyzzy", "sniff485 --help"), ("/dev/null", "live")]
@@ -33,3 +35,18 @@ def test_profiles_are_checked_by_name_or_file(tmp_path: Path, sniff485: Callable
     broken = tmp_path / "pump.toml"
     broken.write_text("nothing = ")
     assert sniff485("profile", "check", str(broken)).code == 3
+
+
+def test_a_bus_that_is_not_there_is_missed_in_the_file(poll: Path, sniff485: Callable[..., Ran]) -> None:
+    ran = sniff485("info", poll, "--bus", "west")
+    assert ran.code == 3
+    assert ran.err.startswith(f"sniff485: {poll}: no bus 'west' in it")
+
+
+def test_a_stretch_that_ends_before_it_begins_is_not_cut(
+    poll: Path, tmp_path: Path, sniff485: Callable[..., Ran]
+) -> None:
+    out = tmp_path / "out.cap.txt"
+    ran = sniff485("cut", poll, "-o", out, "--from", "+5", "--to", "+3")
+    assert (ran.code, ran.err) == (2, "sniff485: --from +5 is after --to +3\n")
+    assert not out.exists()
