@@ -321,7 +321,7 @@ def _common_damage(seen: BusRecord, damage: DamageShare) -> list[Finding]:
     asked = sum(seen.stations[unit].asked for unit in struck)
     answers = damaged - hits.get("master", 0)
     tally = together(seen.stations[unit].damaged for unit in struck)
-    words = f"{answers} of {counted(asked, 'answer')} damaged ({answers / max(1, asked):.1%}), of {units(struck)}"
+    words = f"{answers} of {counted(asked, 'answer')} of {units(struck)} damaged ({answers / max(1, asked):.1%})"
     if "master" in hits:
         words += f", and {counted(hits['master'], 'request')}"
     words += (
