@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field, fields
 from enum import Enum
 from typing import Any
 
-from sniff.formats.text import iso
+from sniff.analysis.json_text import iso
 
 
 class State(Enum):

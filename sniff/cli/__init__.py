@@ -17,6 +17,7 @@ from typing import cast
 
 from dissectors import registry
 from sniff.cli import standard_streams
+from sniff.cli.command_parser import CommandParser
 from sniff.engine.capture_error import CaptureError
 from sniff.version import __version__
 
@@ -159,10 +160,9 @@ def _run(arguments: list[str]) -> int:
     wanted = [name] if name is not None else []
     parser, imported = command_line(wanted, epilog, wanted if chosen_alone else COMMANDS)
     chosen = imported.get(name or "")
-    if getattr(chosen, "TOLERANT", False):
-        args, _ = parser.parse_known_args(arguments)
-    else:
-        args = parser.parse_args(arguments)
+    args, unknown = parser.parse_known_args(arguments)
+    if unknown and not getattr(chosen, "TOLERANT", False):
+        raise Failure(f"{name}: does not know {' '.join(unknown)}; `sniff485 {name} --help` says what it knows", USAGE)
     assert chosen is not None  # argparse has refused anything else
     return _carried_out(chosen, args)
 
@@ -189,7 +189,7 @@ def command_line(
 
     What is generated from the command line (manual pages, completion, pages of the documentation) is made from it.
     """
-    parser = argparse.ArgumentParser(
+    parser = CommandParser(
         prog="sniff485",
         description=DESCRIPTION,
         epilog=epilog,

@@ -103,6 +103,7 @@ def _check(args: argparse.Namespace) -> list[Checked]:
     """Every source; the parts of one recording are one."""
     ports = [source for source in args.sources if not watching.is_file(source)]
     if not ports:
+        watching.refuse_duration(args)
         opened = arguments.open_captures(args.sources)
         sites = Counter(site_name(name) for name, _ in opened)
         return [_read(name, capture, args, sites[site_name(name)] > 1) for name, capture in opened]

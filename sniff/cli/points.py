@@ -92,6 +92,7 @@ def run(args: argparse.Namespace) -> int:
     if port is not None:
         with until_interrupted():  # from before it begins
             return _listen(args, port)
+    watching.refuse_duration(args)
     if args.parquet is None:
         return _print(args)
     if args.latest:

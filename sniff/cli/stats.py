@@ -53,7 +53,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--table", choices=TABLES, help="which table; may also stand after the files (default: nodes)")
     arguments.add_line(parser)
     arguments.add_devices(parser)
-    parser.add_argument("--every", type=arguments.duration, default=1.0, metavar="TIME", help="load: length of a row")
+    parser.add_argument("--every", type=arguments.duration, metavar="TIME", help="load: length of a row (default: 1s)")
     style = parser.add_mutually_exclusive_group()
     style.add_argument("--json", action="store_const", const="json", dest="style", help="one JSON object a row")
     style.add_argument("--csv", action="store_const", const="csv", dest="style", help="comma-separated values")
@@ -68,10 +68,13 @@ def run(args: argparse.Namespace) -> int:
     table, files = args.table or "nodes", args.words
     if len(files) > 1 and files[-1] in TABLES:
         table, files = files[-1], files[:-1]
+    if args.every is not None and table != "load":
+        raise Failure(f"--every is the length of a row of load, and {table} has none", USAGE)
     port = watching.port_of(files)
     if port is not None:
         with until_interrupted():  # from before it begins
             return _listen(args, port, table)
+    watching.refuse_duration(args)
     stray = [word for word in files if "." not in word and not Path(word).exists() and word != "-"]
     if len(files) > 1 and stray:
         hint = "; values have a command of their own: points" if "points" in stray else ""
@@ -138,7 +141,7 @@ def _write(args: argparse.Namespace, table: str, summary: Summary, kinds: _Kinds
         bound = session.adapter.latency / MS
         tables.write(LATENCY_HEADINGS, [(*row, bound) for row in rows], args.style)
     else:
-        tables.write(LOAD_HEADINGS, _load(summary, int(args.every * NS_PER_S)), args.style)
+        tables.write(LOAD_HEADINGS, _load(summary, int((args.every or 1) * NS_PER_S)), args.style)
 
 
 def _listen(args: argparse.Namespace, port: str, table: str) -> int:

@@ -32,6 +32,14 @@ def add_duration(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def refuse_duration(args: argparse.Namespace) -> None:
+    """Of files: end with exit code 2 where --duration is given."""
+    from sniff.cli import USAGE, Failure
+
+    if args.duration is not None:
+        raise Failure("--duration is for a port; `cut` takes a stretch out of a capture", USAGE)
+
+
 def port_of(sources: Sequence[str]) -> str | None:
     """The port or configured bus that is meant; None where files are. Ends with exit code 2 for both at once."""
     ports = [source for source in sources if not is_file(source)]

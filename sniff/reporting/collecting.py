@@ -14,6 +14,7 @@ from dissectors.token_ring import TokenRing
 from dissectors.tracker import Verdict
 from dissectors.words import milliseconds
 from sniff.analysis.health import Health
+from sniff.analysis.json_text import iso
 from sniff.analysis.judging import rules_over
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary, ranked
@@ -28,7 +29,6 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.read_source import ReadSource
 from sniff.engine.session import DEVICES_NOTE, LineEvent, Session
 from sniff.filter import Filter
-from sniff.formats.text import iso
 from sniff.reporting.happenings import Happenings
 from sniff.reporting.numbers import (
     CaptureNumbers,
