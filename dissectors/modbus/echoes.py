@@ -62,6 +62,13 @@ class Echoes:
         fastest = self._learnt.fastest(request.unit)
         return fastest is not None and latency.nominal + self._timing.char < fastest // 2
 
+    def may_have_been_first(self, request: Exchange, seen: Seen) -> bool:
+        """Whether the copy that was taken for the answer to a request may be its echo, and the next one, `seen`, the
+        answer: nothing has told yet whether this bus has echoes, and the adapter leaves open that it came at once."""
+        if self.usual is not None or request.copied is None or request.octets != seen.octets:
+            return False
+        return request.copied < self._silence + max(self._timing.latency, seen.frame.slack)
+
     def note(self, gap: int) -> None:
         """A request that is surely one came back `gap` ns after it."""
         self._gaps.append(gap)

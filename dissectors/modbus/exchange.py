@@ -32,11 +32,13 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class Garble:
-    """A damaged frame, or noise (`no` None), that came in place of an answer."""
+    """A damaged frame, or noise (`no` None), that came in place of an answer. `is_whole`: it has unit, function and
+    length of a copy of the request."""
 
     no: int | None
     end: int
     error: str
+    is_whole: bool = False
 
 
 @dataclass(slots=True)

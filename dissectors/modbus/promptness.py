@@ -61,7 +61,12 @@ class Promptness:
 
     def is_repeat_after_damage(self, request: Exchange, seen: Seen, echoing: bool | None) -> bool:
         """Whether a copy of a request comes well behind a damaged answer to it, with no learnt time that would make it
-        the answer: a master that repeats is far more frequent than a second station with the same address."""
-        if request.garble is None or self.knows(request) or echoing:
+        the answer: a master that repeats is far more frequent than a second station with the same address. Where the
+        damaged frame was the whole answer, it is the repeat whatever was learnt, and as soon as anybody can speak."""
+        garble = request.garble
+        if garble is None or echoing:
             return False
-        return seen.frame.start - request.garble.end >= self._learnt.too_soon(self._silence)
+        silence = seen.frame.start - garble.end
+        if garble.is_whole:
+            return silence + max(self._latency, seen.frame.slack) >= self._silence
+        return not self.knows(request) and silence >= self._learnt.too_soon(self._silence)

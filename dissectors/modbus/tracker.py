@@ -234,7 +234,7 @@ class ModbusTracker(TrackerMemory):
         if pause < self._echoes.limit and not self._may_be_next(pause, seen):  # whichever it was, this repeats it
             if self._echoes.usual:
                 return self._echo(seen)
-            return self._answer_apart(seen, Verdict.ANSWERED_TWICE, request)
+            return self._answered_again(seen, request)
         if newest.octets != request.octets:  # the newest was a request, and this answers it
             return self._request(seen, sure=False)
         if self.learnt.in_time(request.unit, request.pace, pause) and not self.learnt.is_same(gap, pause):
@@ -248,6 +248,11 @@ class ModbusTracker(TrackerMemory):
         for ever: nothing else was said so far, and the adapter, or a late computer, leaves room for its pause."""
         slack = max(self._timing.latency, seen.frame.slack)
         return self._held.only == seen.octets and slack > 0 and pause + slack >= self.learnt.too_soon(self._silence)
+
+    def _answered_again(self, seen: Seen, request: Exchange) -> Placement:
+        """A copy that is no request, of one answered by a copy: a second answer, or the answer behind an echo."""
+        is_open = self._echoes.may_have_been_first(request, seen)
+        return self._answer_apart(seen, Verdict.UNDECIDED if is_open else Verdict.ANSWERED_TWICE, request)
 
     def _join(self, request: Exchange, seen: Seen) -> Placement:
         """Leave open what the frame is: it belongs to the request in any case."""
@@ -264,7 +269,7 @@ class ModbusTracker(TrackerMemory):
                 return self._request(seen, sure=False)
             if last.answered:
                 self._held.twice = seen.no
-                return self._answer_apart(seen, Verdict.ANSWERED_TWICE, last)
+                return self._answered_again(seen, last)
             return self._echo(seen)
         return self._request(seen, sure=False)
 
@@ -281,7 +286,8 @@ class ModbusTracker(TrackerMemory):
                 return self._answer_apart(seen, Verdict.UNSOLICITED)
         elif self._is_damaged_answer(request, seen):
             if request.garble is None:
-                request.garble = Garble(seen.no, seen.frame.end, error)
+                is_whole = len(seen.octets) == len(request.octets) and seen.octets[:2] == request.octets[:2]
+                request.garble = Garble(seen.no, seen.frame.end, error, is_whole)
             return Placement(seen.no, request.tx, Role.RESPONSE, source=request.unit)
         return self._request(seen, sure=False, fault=error)
 

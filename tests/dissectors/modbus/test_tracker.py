@@ -398,3 +398,28 @@ def test_a_repeat_at_once_behind_a_damaged_answer_is_no_echo(bus):
         bus.exchange("020300000001", "0203020007")
         bus.say("010300070002").damage("01030400070009", 12).exchange("010300070002", "01030400070009", pause=14)
     assert bus.run().verdicts == ["answered", "damaged-answer", "retry"] * 3
+
+
+@pytest.mark.parametrize("latency", [0, 17 * MS])
+def test_a_write_repeated_at_once_behind_its_damaged_confirmation_is_no_answer(paper_bus, latency):
+    """Though the times of that station are known."""
+    bus = paper_bus(latency=latency)
+    for _ in range(4):
+        bus.exchange(READ, VALUES).exchange(READ_2, VALUES_2)
+    for _ in range(4):
+        bus.say(WRITE).damage(WRITE, 12, at=4).say(WRITE, 12).say(WRITE, 12)
+    assert bus.run().verdicts[8:] == ["damaged-answer", "retry"] * 4
+
+
+def test_an_answer_to_an_echo_is_no_second_answer_where_the_adapter_hides_the_echo(paper_bus):
+    bus = paper_bus(latency=17 * MS)
+    for value in range(1, 5):
+        write = f"01060010{value:04X}"
+        bus.say(write, 300).say(write, 7).say(write, 1)
+    assert "answered-twice" not in bus.run().verdicts
+
+
+def test_a_second_confirmation_is_one_where_reads_have_no_echo(paper_bus):
+    bus = paper_bus(latency=17 * MS).exchange(READ, VALUES, answer=30).exchange(READ, VALUES, answer=30)
+    bus.exchange(WRITE, WRITE, answer=7, pause=300).say(WRITE, 1)
+    assert bus.run().last.verdict is Verdict.ANSWERED_TWICE
