@@ -198,7 +198,7 @@ def _grid(reads: ReadTimes, char: int) -> tuple[int, int]:
 
 def _fits(pairs: Sequence[tuple[int, int]], period: int, char: int) -> int | None:
     """How far reads scatter about multiples of `period`; None where that is no latency timer's."""
-    tolerance = min(period // 8, 600_000)
+    tolerance = min(period // 8, max(600_000, period // 16))
     few = pairs[:64]
     if sum(_off(interval, period) <= tolerance for interval, _ in few) < (ON_GRID - 0.15) * len(few):
         return None

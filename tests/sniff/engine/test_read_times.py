@@ -57,6 +57,15 @@ def test_a_latency_timer_shows(bus: str, timer: int, rounded: int) -> None:
     assert tap.latency(line) <= told.latency <= tap.latency(line) + 3 * MS // 2
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_latency_timer_shows_on_a_computer_that_takes_its_reads_up_to_a_millisecond_late(seed: int) -> None:
+    chunks, line = heard("RTU", FTDI)
+    rng = random.Random(seed)
+    late = [(chunk.time // (16 * MS) * 16 * MS + rng.randrange(1_100_000), len(chunk.octets)) for chunk in chunks]
+    told = held_back(ReadTimes.of(late), line)
+    assert (told.period, told.latency > 17 * MS) == (16 * MS, True)
+
+
 @pytest.mark.parametrize("interval", [2, 4, 8, 16, 20, 100])
 def test_a_steady_rhythm_is_no_timer(interval: int) -> None:
     reads = [(number * interval * MS, 8 if number % 2 else 1) for number in range(200)]
