@@ -12,7 +12,7 @@ from dissectors.line import Timing
 from dissectors.modbus.exchange import Exchange, Seen, is_begin_of
 from dissectors.modbus.functions import BROADCAST
 from dissectors.modbus.learned_timing import LearnedTiming
-from dissectors.modbus.promptness import AT_ONCE
+from dissectors.modbus.promptness import AT_ONCE, has_no_layout
 
 ECHO_VOTES = 4
 """Answered requests with an echo, or without, that count at most against what is seen now."""
@@ -67,7 +67,14 @@ class Echoes:
         answer: nothing has told yet whether this bus has echoes, and the adapter leaves open that it came at once."""
         if self.usual is not None or request.copied is None or request.octets != seen.octets:
             return False
-        return request.copied < self._silence + max(self._timing.latency, seen.frame.slack)
+        return request.copied < self._silence + max(self._learnt.margin, seen.frame.slack)
+
+    def owes_answer(self, request: Exchange, seen: Seen) -> bool:
+        """Whether the copy that was taken for the answer to a request was its echo, as this bus has one of each, and
+        `seen` is the answer."""
+        if not self.usual or request.copied is None or request.echoed or not request.answered:
+            return False
+        return request.octets == seen.octets or (has_no_layout(seen) and request.is_for(seen.octets))
 
     def note(self, gap: int) -> None:
         """A request that is surely one came back `gap` ns after it."""

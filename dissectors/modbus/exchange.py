@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from dissectors.frame import Frame, Header, Role
-from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, ITEMS_ASKED, answer_length
 from dissectors.modbus.learned_timing import READ, WRITE
+from dissectors.modbus.notation import CHECK, HEAD
 from dissectors.quick_values import quickly_made
 from dissectors.tracker import Interval, Transaction, Verdict
 
@@ -193,8 +194,17 @@ def damaged_request(fault: str) -> str:
 
 
 def is_begin_of(octets: bytes, whole: bytes) -> bool:
-    """Whether octets are another frame's first ones, at least four of them, and not all."""
-    return 4 <= len(octets) < len(whole) and whole.startswith(octets)
+    """Whether octets are a request's first ones, not all, and so many that no answer to it begins so."""
+    return _own_octets(whole) <= len(octets) < len(whole) and whole.startswith(octets)
+
+
+def _own_octets(request: bytes) -> int:
+    """From how many octets on a request differs from its answer: from the third, where that is not what an answer would
+    count (RTU); else from the fourth."""
+    if len(request) < HEAD or request[1] not in ITEMS_ASKED:
+        return 4
+    length = answer_length(request)
+    return 3 if length is not None and request[HEAD] != length - HEAD - 1 - CHECK else 4
 
 
 def echo_of(tx: int, seen: Seen, original: Exchange, error: str | None = None) -> Transaction:

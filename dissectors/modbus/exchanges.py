@@ -104,7 +104,7 @@ class Exchanges:
                 error = f"unit {request.unit} answered a broadcast"
                 self.closed.append(answer_apart(request.tx, request.request, Verdict.UNSOLICITED, None, error))
                 return
-            elif request.may_be_answer or (request.echoed and not request.sure and not self._echoes.usual):
+            elif request.may_be_answer or (not request.sure and self._may_be_copy(request)):
                 verdict = Verdict.UNDECIDED
             elif request.remark is FIRST_SEEN and request.tx == 1:
                 verdict = Verdict.OPEN
@@ -114,6 +114,11 @@ class Exchanges:
         if verdict is Verdict.NO_RESPONSE:
             self.given_up.append(request)
         self.closed.append(request.close(verdict))
+
+    def _may_be_copy(self, request: Exchange) -> bool:
+        """Whether what looks like a request and got nothing may be an answer: where requests have no echo, one that had
+        one; where all have, a repeat without."""
+        return not self._echoes.usual if request.echoed else bool(self._echoes.usual) and request.attempt > 1
 
     def drop_chain(self, verdict: Verdict) -> None:
         """Close the requests that waited for the open one, in the order they came."""

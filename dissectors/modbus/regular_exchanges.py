@@ -35,6 +35,7 @@ _ANSWERED, _RETRY, _EXCEPTION, _NO_RESPONSE, _TO_ALL = (
 )
 _PADDING: Final = 8
 _LEAST: Final = 4  # octets of the shortest good frame
+_CUT_LEAST: Final = 3  # octets of the shortest echo that was cut, see `is_begin_of`
 _CR: Final = 0x0D
 
 PLAIN, REFUSED, REPEATED, UNANSWERED, TO_ALL = range(5)
@@ -128,8 +129,8 @@ def _may_repeat(length: Numbers, code: Octets, request: Times, behind: Times) ->
 
 def _is_cut(length: Numbers, offset: Times, octets: Octets, request: Times, behind: Times) -> Masks:
     """Whether the frame behind a request is its begin: an echo that was cut short."""
-    cut = (length[behind] < length[request]) & (length[behind] >= _LEAST)
-    for at in range(_LEAST):
+    cut = (length[behind] < length[request]) & (length[behind] >= _CUT_LEAST)
+    for at in range(_CUT_LEAST):
         which = np.flatnonzero(cut)
         cut[which] = octets[offset[request[which]] + at] == octets[offset[behind[which]] + at]
     for at in np.flatnonzero(cut).tolist():

@@ -26,7 +26,7 @@ from dissectors.modbus.doubts import is_full
 from dissectors.modbus.envelope import readable_adu
 from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, echo_of
 from dissectors.modbus.exchanges import FIRST_SEEN
-from dissectors.modbus.functions import BROADCAST
+from dissectors.modbus.functions import BROADCAST, ITEMS_ASKED
 from dissectors.modbus.pairing import another_function, is_listen_only, is_restart, mismatch
 from dissectors.modbus.tracker_memory import TrackerMemory
 from dissectors.tracker import Placement, Tracked, Transaction, Verdict
@@ -197,6 +197,8 @@ class ModbusTracker(TrackerMemory):
         if request.copies:
             return self._after_copy(request, seen)
         if request.is_for(seen.octets):
+            if seen.header.function in ITEMS_ASKED and self._echoes.is_of_request(request, seen):
+                return self._request(seen)  # coils that say what was asked for them, octet for octet, are hardly any
             if request.octets == seen.octets and self._echoes.is_of_write(request, seen):
                 return self._echo(seen)
             if request.octets == seen.octets and self._times.is_repeat_after_damage(request, seen, self._echoes.usual):
@@ -254,6 +256,11 @@ class ModbusTracker(TrackerMemory):
         is_open = self._echoes.may_have_been_first(request, seen)
         return self._answer_apart(seen, Verdict.UNDECIDED if is_open else Verdict.ANSWERED_TWICE, request)
 
+    def _answer_behind_echo(self, request: Exchange, seen: Seen) -> Placement:
+        """The answer to a request whose echo, read late, was taken for it."""
+        request.echoed, request.copied = True, None
+        return self._answer_apart(seen, Verdict.UNDECIDED, request)
+
     def _join(self, request: Exchange, seen: Seen) -> Placement:
         """Leave open what the frame is: it belongs to the request in any case."""
         request.copies.append(seen)
@@ -262,6 +269,8 @@ class ModbusTracker(TrackerMemory):
     def _either_unasked(self, seen: Seen) -> Placement:
         """No request is open: a new one, unless it comes too soon for that."""
         last = self._held.last
+        if last is not None and self._echoes.owes_answer(last, seen) and self._times.in_time(last, seen):
+            return self._answer_behind_echo(last, seen)
         gap = 0 if self._last_end is None else max(0, seen.frame.start - self._last_end)
         too_soon = gap < self.learnt.too_soon(self._silence) and not self._may_be_next(gap, seen)
         if last is not None and last.octets == seen.octets and too_soon:
@@ -324,7 +333,7 @@ class ModbusTracker(TrackerMemory):
 
     def _may_be_answered_by(self, before: Exchange, seen: Seen) -> bool:
         """Whether an equal request that comes later than answers usually do may be a slow answer all the same."""
-        if before.sure or not self._is_plain(before) or before.echoed:
+        if before.sure or not self._is_plain(before) or (before.echoed and not self._echoes.usual):
             return False
         gap = before.gap(seen.frame.start)
         return len(self._held.chain) < _CHAIN_MOST and (self.timeout is None or gap < self.timeout * 9 // 10)

@@ -423,3 +423,32 @@ def test_a_second_confirmation_is_one_where_reads_have_no_echo(paper_bus):
     bus = paper_bus(latency=17 * MS).exchange(READ, VALUES, answer=30).exchange(READ, VALUES, answer=30)
     bus.exchange(WRITE, WRITE, answer=7, pause=300).say(WRITE, 1)
     assert bus.run().last.verdict is Verdict.ANSWERED_TWICE
+
+
+def test_an_echo_cut_to_three_octets_is_one_where_no_answer_begins_so(bus):
+    for _ in range(3):
+        bus.say(READ, 300).cut(READ, 3, 0.7)
+    assert bus.run().verdicts.count("echo") == 3
+
+
+def test_an_echo_read_late_is_no_answer_where_all_requests_have_echoes(bus):
+    """The copy behind it is the answer, and not a second one, nor a request that gets none."""
+    for _ in range(4):
+        bus.say(READ).say(READ, 0.7).say(VALUES)
+    for answer in (3, 30):
+        bus.say(WRITE, 200).say(WRITE, 9).say(WRITE, answer)
+    assert bus.run().verdicts[8:] == ["answered", "answered-or-repeated"] * 2
+
+
+def test_an_answer_read_late_behind_an_echo_is_perhaps_one(bus):
+    for _ in range(4):
+        bus.say(READ).say(READ, 0.7).say(VALUES)
+    bus.say(WRITE, 200).say(WRITE, 0.7).say(WRITE, 120).say(READ, 8).say(READ, 0.7).say(VALUES)
+    assert "no-response" not in bus.run().verdicts
+
+
+def test_an_echo_of_a_read_that_looks_like_its_answer_is_an_echo(bus):
+    coils = "010103000011"  # 17 coils from 0x0300 on: three octets of values, by the count
+    for _ in range(3):
+        bus.say(coils).say(coils, 0.7).say("010103123401")
+    assert bus.run().verdicts == ["answered", "echo"] * 3
