@@ -64,7 +64,7 @@ def _swapped(octets: bytes, expected: Expected | None, heard: Set[int]) -> Repai
     if len(octets) < _SHORTEST or octets[-1] == octets[-2]:
         return None
     whole = octets[:-2] + octets[:-3:-1]
-    known = _is_known(whole[0], expected, heard) or _may_be_first(whole, heard)
+    known = _is_known(whole[0], expected, heard) or (not heard and whole[0] <= MAX_UNIT)  # since all have that flaw
     if crc16_modbus(whole) or not known or not _is_formed(whole, expected):
         return None
     return Repair(Flaw.CHECK_SWAPPED, whole)

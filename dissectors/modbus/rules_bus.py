@@ -183,8 +183,11 @@ def _of_requests(seen: BusRecord) -> Iterator[Finding]:
             f"{counted(count, 'request')} came a second time {fine_milliseconds(again)} after the first, never a third"
         )
         yield seen.again.tally.found(RULES["MB018"], "bus", f"{words}, and were answered then")
-    for flaw, tally in seen.requests_damaged_by.items():
-        if tally.count >= _CUT_LEAST and 2 * tally.count >= seen.damaged_requests.count:
+    flaws, damaged = seen.requests_damaged_by, seen.damaged_requests.count
+    # where not one is good and all that can be put right have one flaw, the others are two in one read
+    of = 4 if damaged == seen.requests and len(flaws) == 1 else 2
+    for flaw, tally in flaws.items():
+        if tally.count >= _CUT_LEAST and of * tally.count >= damaged:
             words = f"{counted(tally.count, 'request')} good but for one thing: {flaw.value}"
             severity = note_if(seen.rare(tally.count, seen.requests))
             if tally.count == seen.requests:

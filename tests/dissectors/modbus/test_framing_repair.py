@@ -114,6 +114,13 @@ def test_random_damage_is_hardly_ever_repaired_wrongly() -> None:
     assert sum(hurt[e.octets] != e.repair.octets for e in repaired if e.repair) <= 6
 
 
+def test_where_everybody_swaps_the_check_writes_are_put_right_as_well() -> None:
+    """A write has the shape of its answer, and its values say nothing: the check does."""
+    writes = [SPOIL[Flaw.CHECK_SWAPPED](sealed(bytes((1, 6, 0, 3, 0, value)))) for value in range(4)]
+    found = frames(read(writes, gap=300))
+    assert [frame.repair.flaw for frame in found if frame.repair] == [Flaw.CHECK_SWAPPED] * 4
+
+
 # --- echoes -----------------------------------------------------------------------------------------------------------
 
 

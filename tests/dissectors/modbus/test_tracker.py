@@ -452,3 +452,9 @@ def test_an_echo_of_a_read_that_looks_like_its_answer_is_an_echo(bus):
     for _ in range(3):
         bus.say(coils).say(coils, 0.7).say("010103123401")
     assert bus.run().verdicts == ["answered", "echo"] * 3
+
+
+def test_of_damaged_writes_only_the_first_behind_a_damaged_one_is_its_answer(bus):
+    for _ in range(3):
+        bus.damage(WRITE, 300).damage(WRITE, 10)
+    assert bus.run().verdicts == ["damaged-request"] * 3
