@@ -320,7 +320,7 @@ class ModbusTracker(TrackerMemory):
         an answer all the same when it comes as soon as that station's answers do, which no master does."""
         if seen.header.role is Role.REQUEST:
             return seen.unit == request.unit and self._times.is_prompt(request, seen)
-        if request.is_for(seen.octets) and request.garble is None:
+        if request.is_for(seen.octets) and (request.garble is None or seen.header.role is Role.RESPONSE):
             return True
         return self._times.in_time(request, seen) and not names_another(seen, request.unit, self._units)
 
