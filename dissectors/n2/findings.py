@@ -96,6 +96,8 @@ class N2Findings:
             if placement.destination is not None and placement.destination != self.turn:
                 self.station(placement.destination).turns += 1
             self.turn = placement.destination
+        elif last is not None and meant(event) == meant(last.frame) and event.start - last.frame.end < HASTE:
+            pass  # an echo that was cut short, and says nothing of who was echoed
         elif event.damage is not Damage.RESTARTED or event.repair is not None:
             counts = self._add_bad("master", self.master, no, event)
             gave_up = last is not None and event.start - last.frame.end >= HASTE

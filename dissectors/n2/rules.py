@@ -97,7 +97,8 @@ RULES: dict[str, Rule] = {
             "N2009",
             Severity.NOTE,
             "command refused",
-            "A station refuses commands with an error code other than N00 and N11.",
+            "A station refuses commands with an error code other than N00 and N11. A warning where it refuses all, "
+            "five or more.",
             "the master asks for what the device does not do",
             "look at the error code and at the command that was refused",
         ),

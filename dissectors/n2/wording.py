@@ -249,12 +249,18 @@ def _of_station(heard: N2Evidence, name: str, station: N2StationRecord, is_told:
         yield _missing(heard, name, station)
     yield from _overrides(heard, name, station)
     yield from _again(heard, name, station)
+    refused = sum(tally.count for tally in station.refused.values())
+    is_all = refused >= REFUSED_LEAST and refused == station.answered
     for (code, title), tally in sorted(station.refused.items()):
         words = f"N{code} {error_name(code)}".rstrip()
-        yield tally.found(RULES["N2009"], name, f"{title} refused {times(tally.count)}: {words}")
+        seen = f"{title} refused {times(tally.count)}: {words}" + ("; it obeys nothing" if is_all else "")
+        yield tally.found(RULES["N2009"], name, seen, Severity.WARNING if is_all else None)
     if station.again.count:
         yield station.again.found(RULES["N2010"], name, f"identified again {times(station.again.count)}")
 
+
+REFUSED_LEAST = 5
+"""Refusals of a station that does nothing else, from which on that is a fault."""
 
 MANY_POINTS = 4
 """From so many absent points of one station on it is one thing that is wrong: the list that the master has of it."""
