@@ -133,7 +133,7 @@ RULES: dict[str, Rule] = {
             "first octet: a driver or converter that is switched on too late; last octet: one that lets go too soon; "
             "checksum: the program of the device",
             "the direction control of that station and of the converter in between; the same with another adapter",
-            explains=("N2004", "N2005", "LN1", "LN2"),
+            explains=("N2004", "N2005", "LN003", "LN1", "LN2"),
         ),
         Rule(
             "N2013",

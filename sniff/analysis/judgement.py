@@ -16,9 +16,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from dissectors.findings import Finding, Rule, merged, with_consequences
+from dissectors.findings import Finding, Rule, Severity, merged, with_consequences
 from sniff.analysis.sanitizing import sanitized
 
+RUBBISH = "LN003"  # the code of "hardly anything is a frame"
 RUBBISH_LEAST = 60  # octets before "hardly anything is a frame" is said
 RUBBISH_TOLD = 40  # the same where it is known what they are
 PROVED_FRAMES = 20
@@ -101,17 +102,23 @@ class Judgement:
         )
 
     def findings(self, rules: Mapping[str, Rule]) -> tuple[Finding, ...]:
-        """All findings, the gravest first. Where hardly anything is a frame, the line speaks alone. `rules`: every rule
-        that the bus is judged by."""
+        """All findings, the gravest first. Where hardly anything is a frame, the line speaks alone, and what explains
+        that. `rules`: every rule that the bus is judged by."""
         speaks_alone = self.heard.is_rubbish
         made = (*self.host, *(self.overall if speaks_alone or self.heard.is_nothing else self.line))
-        made += () if speaks_alone else self.bus
+        made += tuple(one for one in self.bus if not speaks_alone or _explains_rubbish(one, rules))
         return tuple(
             sorted(
                 map(_harmless, with_consequences(made, rules)),
                 key=lambda finding: (-finding.severity, finding.first, finding.code, finding.subject),
             )
         )
+
+
+def _explains_rubbish(finding: Finding, rules: Mapping[str, Rule]) -> bool:
+    """Whether a finding tells why hardly anything is a frame: all are, but for one and the same thing."""
+    rule = rules.get(finding.code)
+    return rule is not None and RUBBISH in rule.explains and finding.severity >= Severity.WARNING
 
 
 def _beside(unheard: tuple[Finding, ...], heard: tuple[Finding, ...]) -> tuple[Finding, ...]:
