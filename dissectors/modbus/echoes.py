@@ -43,6 +43,8 @@ class Echoes:
         """Whether a sure request repeats the newest one at once; a master repeats only after its timeout."""
         if newest is None or newest.octets != seen.octets or newest.answered or newest.fault or newest.garble:
             return False  # behind a damaged answer a master may repeat at once
+        if self._timing.latency >= AT_ONCE and self.usual is False:
+            return False  # no times tell, but others do
         gap = newest.gap(seen.frame.start)
         if self._learnt.timeout is not None:
             return gap < self.limit or gap * 8 < self._learnt.timeout

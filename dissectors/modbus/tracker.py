@@ -204,8 +204,10 @@ class ModbusTracker(TrackerMemory):
             if request.octets == seen.octets and self._times.is_repeat_after_damage(request, seen, self._echoes.usual):
                 return self._request(seen, sure=False)
             why = None if request.fault else mismatch(request.octets, seen.octets)
-            # a station may answer with the value that it really took, or with a wrong length
-            near = request.octets[:4] == seen.octets[:4] and self._times.is_prompt(request, seen)
+            # a station may answer with the value that it really took, or with a wrong length; not where another's
+            # answer came between, since the one that was late may be this very request
+            same_place = request.octets[:4] == seen.octets[:4] and not request.disturbed
+            near = same_place and self._times.is_prompt(request, seen)
             if (why is None or near or seen.header.role is Role.UNKNOWN) and self._times.in_time(request, seen):
                 return self._answer(request, seen, why)
             if self._times.is_doubtful(request, seen, fits=why is None):

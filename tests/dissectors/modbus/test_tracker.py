@@ -458,3 +458,19 @@ def test_of_damaged_writes_only_the_first_behind_a_damaged_one_is_its_answer(bus
     for _ in range(3):
         bus.damage(WRITE, 300).damage(WRITE, 10)
     assert bus.run().verdicts == ["damaged-request"] * 3
+
+
+def test_without_times_a_request_again_is_no_echo_where_others_have_none(paper_bus):
+    bus = paper_bus(latency=50 * MS)
+    for _ in range(4):
+        bus.exchange(READ, VALUES, answer=1, pause=1).say(READ_2, 1).say(READ_2, 1)
+    assert bus.run().verdicts.count("echo") == 0
+
+
+def test_what_another_write_says_is_no_answer_where_one_of_another_station_came_between(paper_bus):
+    """A confirmation that is late by a turn, in a log without times."""
+    bus = paper_bus(latency=50 * MS)
+    for value in range(1, 5):
+        write = f"030600050{value:03X}"
+        bus.say(write, 1).say(READ, 1).say(write, 1).say(VALUES, 1)
+    assert not [one for one in bus.run().transactions if "another value" in (one.error or "")]
