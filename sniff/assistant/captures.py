@@ -9,14 +9,11 @@ from sniff.assistant.asking import Refused
 
 
 class Captures:
-    """Names → paths. A name is the file's; where two are called alike, the folder stands before it."""
+    """Names → paths. A name is the file's; where several are called alike, as many folders as tell them apart."""
 
     def __init__(self, paths: Iterable[str]) -> None:
-        found = [Path(path).absolute() for path in dict.fromkeys(paths)]
-        called = [path.name for path in found]
-        self._paths = {
-            path.name if called.count(path.name) == 1 else f"{path.parent.name}/{path.name}": path for path in found
-        }
+        found = list(dict.fromkeys(Path(path).absolute() for path in paths))
+        self._paths = {_name(path, found): path for path in found}
 
     @property
     def names(self) -> list[str]:
@@ -30,3 +27,11 @@ class Captures:
         if name not in self._paths:
             raise Refused(f"no capture is called {name[:80]!r}; there are: {', '.join(self._paths)}")
         return str(self._paths[name])
+
+
+def _name(path: Path, among: list[Path]) -> str:
+    for depth in range(1, len(path.parts)):
+        last = path.parts[-depth:]
+        if sum(other.parts[-depth:] == last for other in among) == 1:
+            return "/".join(last)
+    return str(path)

@@ -12,7 +12,7 @@ from mcp_types import ToolAnnotations
 from pydantic import Field
 
 from dissectors import registry
-from sniff.assistant.answers import answer, as_json, harmless
+from sniff.assistant.answers import answer, as_json, bounded, harmless, marked, missing
 from sniff.assistant.asking import Asking, Refused, Said
 from sniff.assistant.captures import Captures
 from sniff.version import __version__
@@ -101,7 +101,7 @@ class _Desk:
     async def rule(self, code: Annotated[str, Field(description="a code, or the begin of several: MB001, LN2")]) -> str:
         """What rules measure, against which limit and source, what their findings are consistent with, what to check
         next, and which other findings they explain."""
-        return as_json({"rules": harmless((await self._run("rule", "--json", "--", code)).objects())})
+        return _own("rules", (await self._run("rule", "--json", "--", code)).objects())
 
     async def frames(
         self,
@@ -117,9 +117,9 @@ class _Desk:
         wanted = filter if not after else f"frame.number > {after}" + (f" && ({filter})" if filter else "")
         where = [f"-Y{wanted}"] if wanted else []
         said = await self._ask("show", capture, bus, "--json", f"--count={limit}", *where, *_devices(devices))
-        rows = [_row(one) for one in said.objects()]
-        more = f"ask again with after={rows[-1]['no']}" if len(rows) == limit else ""
-        return answer(rows, more)
+        rows = bounded([_row(one) for one in said.objects()])
+        more = len(rows) == limit or len(rows) < len(said.lines) or not said.whole
+        return marked(rows, f"ask again with after={rows[-1]['no']}" if rows and more else "")
 
     async def frame(
         self,
@@ -133,14 +133,14 @@ class _Desk:
         said = await self._ask("show", capture, bus, "-V", "-x", "--count=1", where, *_devices(devices))
         if not said.lines:
             raise ToolError(f"there is no frame {number}")
-        return answer(said.lines[:400])
+        return answer(said.lines)
 
     async def nodes(self, capture: Capture = "", bus: Bus = "") -> str:
         """The stations of a bus: frames from and to each, questions and what became of them, response times; and the
         health of the bus and of each station from 0 to 100, with reasons."""
         told = await self._ask("stats", capture, bus, "--table=nodes", "--json")
         health = await self._ask("stats", capture, bus, "--table=health", "--json")
-        return answer(told.objects(), health=harmless(health.objects()[:100]))
+        return answer(told.objects(), health=harmless(health.objects()))
 
     async def points(
         self,
@@ -169,14 +169,17 @@ class _Desk:
     ) -> str:
         """Names for filters, with their types and words."""
         said = await self._run("show", f"--help-fields={protocol}", "-")
-        return as_json({"fields": [line for line in said.lines if like.lower() in line.lower()][:300]})
+        return _own("fields", [line for line in said.lines if like.lower() in line.lower()])
 
     async def _ask(self, command: str, capture: str, bus: str, *options: str) -> Said:
         try:
             path = self._captures.path(capture)
         except Refused as error:
             raise ToolError(str(error)) from None
-        return await self._run(command, *([f"--bus={bus}"] if bus else []), *options, path)
+        try:
+            return await self._run(command, *([f"--bus={bus}"] if bus else []), *options, path)
+        except ToolError as error:  # where the file is concerns nobody who asks
+            raise ToolError(str(error).replace(path, capture or Path(path).name)) from None
 
     async def _run(self, *arguments: str) -> Said:
         if any("\0" in argument or len(argument) > 4000 for argument in arguments):
@@ -185,6 +188,13 @@ class _Desk:
             return await self._asking.ask(arguments)
         except Refused as error:
             raise ToolError(harmless(str(error))) from None
+
+
+def _own(name: str, items: list[Any]) -> str:
+    """What this program says of itself, as much as there is room for."""
+    given = bounded(items)
+    left_off = missing(items, given)
+    return as_json({**({"left_off": left_off} if left_off else {}), name: given})
 
 
 def _devices(devices: list[str]) -> list[str]:

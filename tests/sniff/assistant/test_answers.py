@@ -9,11 +9,14 @@ from importlib.util import find_spec
 
 import pytest
 
-from sniff.assistant.answers import MOST_CHARACTERS, MOST_OF_A_TEXT, answer, harmless
+from sniff.assistant.answers import MOST_CHARACTERS, MOST_OF_A_LIST, MOST_OF_A_TEXT, answer, harmless
 from sniff.assistant.asking import Asking, Refused, Said
 from sniff.assistant.captures import Captures
 
 pytestmark = pytest.mark.skipif(find_spec("mcp") is None, reason="needs mcp")  # importing it takes a second
+
+
+ROW = dict.fromkeys(("no", "t", "src", "dst", "role", "kind", "ok", "error", "verdict", "latency_ms", "text", "hex"))
 
 
 class Scripted(Asking):
@@ -68,10 +71,48 @@ def test_a_filter_is_one_argument_whatever_it_holds() -> None:
 
 
 def test_frames_go_on_behind_the_last() -> None:
-    row = dict.fromkeys(("t", "src", "dst", "role", "kind", "ok", "error", "verdict", "latency_ms", "text", "hex"))
-    told, asked = call([json.dumps({"no": 7, **row})], "frames", filter="dst == 3", after=5, limit=1)
+    told, asked = call([json.dumps({**ROW, "no": 7})], "frames", filter="dst == 3", after=5, limit=1)
     assert "-Yframe.number > 5 && (dst == 3)" in asked[0]
     assert json.loads(told)["left_off"] == "ask again with after=7"
+
+
+def test_frames_go_on_behind_the_last_that_there_was_room_for() -> None:
+    """Not behind the last that was found: those between them would be missed."""
+    lines = [json.dumps({**ROW, "no": number, "hex": "55 " * 120}) for number in range(1, 201)]
+    given = json.loads(call(lines, "frames", limit=200)[0])
+    assert 50 < len(given["data"]) < 200
+    assert given["left_off"] == f"ask again with after={given['data'][-1]['no']}"
+
+
+def test_a_long_list_says_how_long_it_is() -> None:
+    given = harmless(list(range(1000)))
+    assert len(given) == MOST_OF_A_LIST + 1
+    assert given[-1] == "… (1000 in all)"
+
+
+def test_a_tree_and_what_the_program_says_of_itself_are_bounded_and_say_so() -> None:
+    lines = [f"{number:>6} {'x' * 90}" for number in range(600)]
+    for tool, name, asked in (("frame", "data", {"number": 1}), ("fields", "fields", {"protocol": "mstp"})):
+        told = call(lines, tool, **asked)[0]
+        given = json.loads(told)
+        assert given["left_off"].startswith(f"{600 - len(given[name])} more")
+        assert len(told) < MOST_CHARACTERS + 2000
+    rules = [json.dumps({"code": f"LN{number}", "means": "x" * 300}) for number in range(200)]
+    assert len(call(rules, "rule", code="")[0]) < MOST_CHARACTERS + 2000
+
+
+def test_where_a_capture_is_is_not_told() -> None:
+    from mcp.server.mcpserver.exceptions import ToolError
+
+    class Refusing(Scripted):
+        async def ask(self, arguments: Sequence[str], most_octets: int = 0) -> Said:
+            raise Refused("/data/night.mcap: no capture")
+
+    from sniff.assistant.server import server
+
+    made = server(Captures(["/data/night.mcap"]), Refusing([]))
+    with pytest.raises(ToolError, match=r": night\.mcap: no capture"):
+        asyncio.run(made.call_tool("info", {}))
 
 
 @pytest.mark.parametrize("device", ["3=/etc/passwd", "3=../x", "x.toml", "3=a.toml", "--help"])
@@ -85,6 +126,7 @@ def test_profiles_are_named_and_never_files(device: str) -> None:
 def test_only_the_captures_that_are_served_can_be_read(tmp_path: object) -> None:
     captures = Captures(["a/x.mcap", "b/x.mcap", "c.mcap"])
     assert captures.names == ["a/x.mcap", "b/x.mcap", "c.mcap"]
+    assert Captures(["/a/p/x.mcap", "/b/p/x.mcap", "/b/p/./x.mcap"]).names == ["a/p/x.mcap", "b/p/x.mcap"]
     for name in ("", "/etc/passwd", "x.mcap", "../c.mcap"):
         with pytest.raises(Refused, match="no capture is called"):
             captures.path(name)
