@@ -1,5 +1,6 @@
 """MS/TP frames under other names: MAC addresses, device instances and network addresses renumbered; texts and what is
-in files blanked. A range of instances that is asked for becomes that of the one device in it, or all.
+in files blanked, texts in damaged frames too. A range of instances that is asked for becomes that of the one device in
+it, or all.
 
 The data of extended (COBS) frames is blanked whole: it would not keep its length.
 """
@@ -10,7 +11,7 @@ import re
 
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import npdu as npdus
-from dissectors.bacnet.frame_types import data_length
+from dissectors.bacnet.frame_types import PREAMBLE, data_length
 from dissectors.bacnet.tags import header_at
 from dissectors.checksums import crc8_mstp, crc16_x25
 from dissectors.frame import Frame
@@ -52,7 +53,9 @@ class MstpRenamer:
         check = octets[7] ^ crc8_mstp(octets[2:7]) ^ crc8_mstp(header)  # linear: the error in it stays what it was
         head = octets[:2] + header + bytes([check])
         length = data_length(octets)
-        if not intact or not length:
+        if not intact:
+            return head + self._damaged(octets[8:], length)
+        if not length:
             return head + octets[8:]
         if octets[2] >= 32:  # encoded: its length would not survive a change of its content; the frame reads damaged
             return head + self._blanks.of(octets[8:])
@@ -60,6 +63,16 @@ class MstpRenamer:
         renamed = self._npdu(data) if octets[2] in (5, 6) else self._without_text(data)
         error = int.from_bytes(end[:2], "little") ^ crc16_x25(data)
         return head + renamed + (crc16_x25(renamed) ^ error).to_bytes(2, "little") + end[2:]
+
+    def _damaged(self, rest: bytes, length: int) -> bytes:
+        """What follows a header, without texts; a wrong check at its end stays wrong by as much."""
+        parts = rest.split(PREAMBLE)  # a frame that begins in it goes on beginning there
+        data = rest[:length] if len(parts) == 1 and len(rest) == length + 2 else None
+        if data is None:
+            return PREAMBLE.join(map(self._without_any_text, parts))
+        renamed = self._without_any_text(data)
+        error = int.from_bytes(rest[length:], "little") ^ crc16_x25(data)
+        return renamed + (crc16_x25(renamed) ^ error).to_bytes(2, "little")
 
     def _npdu(self, data: bytes) -> bytes:
         header = npdus.decode(data)

@@ -1,16 +1,13 @@
 """Modbus frames under other names: units renumbered, text blanked where the layout has any (server
-identification, functions 17 and 43/14)."""
+identification, functions 17 and 43/14), in damaged frames too."""
 
 from __future__ import annotations
 
 from dissectors.checksums import crc16_modbus, lrc
 from dissectors.frame import Damage, Frame
 from dissectors.modbus.envelope import seal_rtu
-from dissectors.modbus.layout import MESSAGES
-from dissectors.modbus.notation import has_text
+from dissectors.modbus.text_places import text_places
 from dissectors.pseudonyms import Blanks, Pseudonyms, hex_octet, inflicted, without_text
-
-_WITH_TEXT = frozenset(code for code, messages in MESSAGES.items() if has_text(messages.response))
 
 
 class RtuRenamer:
@@ -28,18 +25,25 @@ class RtuRenamer:
             return inflicted(octets, whole, seal_rtu(self.pdu(whole[:-2])))
         if frame.ok:
             return seal_rtu(self.pdu(octets[:-2]))
-        renamed = bytes([self.stations.if_known(octets[0])]) + octets[1:] if octets else octets
         if frame.damage is not Damage.CHECK or len(octets) < 4:
-            return renamed
-        moved = crc16_modbus(octets[:-2]) ^ crc16_modbus(renamed[:-2])  # linear: the error in it stays what it was
-        return renamed[:-2] + (int.from_bytes(octets[-2:], "little") ^ moved).to_bytes(2, "little")
+            return self.damaged_pdu(octets)
+        renamed = self.damaged_pdu(octets[:-2])
+        moved = crc16_modbus(octets[:-2]) ^ crc16_modbus(renamed)  # linear: the error in it stays what it was
+        return renamed + (int.from_bytes(octets[-2:], "little") ^ moved).to_bytes(2, "little")
 
     def pdu(self, body: bytes) -> bytes:
         """Unit and PDU, renamed."""
-        unit, pdu = body[:1], body[1:]
-        if pdu and pdu[0] in _WITH_TEXT:
-            pdu = pdu[:1] + without_text(pdu[1:], self._blanks.of)
-        return bytes([self.stations.of(unit[0])]) + pdu
+        return bytes([self.stations.of(body[0])]) + self._without_text(body[1:])
+
+    def damaged_pdu(self, body: bytes) -> bytes:
+        """The same where the unit may be nobody's, and anything may be missing."""
+        return bytes(map(self.stations.if_known, body[:1])) + self._without_text(body[1:])
+
+    def _without_text(self, pdu: bytes) -> bytes:
+        renamed = bytearray(pdu)
+        for begin, end in text_places(pdu):
+            renamed[begin:end] = without_text(pdu[begin:end], self._blanks.of)
+        return bytes(renamed)
 
 
 class AsciiRenamer:
@@ -60,19 +64,22 @@ class AsciiRenamer:
         text = bytes(octet & 0x7F for octet in octets)
         end = text.find(b"\r") if b"\r" in text else len(text)
         if not intact:
-            address = hex_octet(text[1:3])
-            new = address if address is None else self.stations.if_known(address)
-            if address is None or new is None or new == address:
-                return octets
-            sent = hex_octet(text[end - 2 : end])
-            if not check or sent is None or end < 7:
-                return octets[:1] + b"%02X" % new + octets[3:]
-            return (
-                octets[:1]
-                + b"%02X" % new
-                + octets[3 : end - 2]
-                + b"%02X" % (sent + address - new & 0xFF)
-                + octets[end:]
-            )
+            return self._damaged(octets, text[1:end], check)
         body = self.rtu.pdu(bytes.fromhex(text[1:end].decode())[:-1])
         return octets[:1] + (body + bytes([lrc(body)])).hex().upper().encode() + octets[end:]
+
+    def _damaged(self, octets: bytes, digits: bytes, check: bool) -> bytes:
+        """`check`: only the sum is wrong; it stays wrong by as much. Digits that were spoilt stay as they are."""
+        pairs = [hex_octet(digits[at : at + 2]) for at in range(0, len(digits) - 1, 2)]
+        if not pairs or pairs[0] is None:
+            return octets
+        sent = pairs.pop() if check and len(pairs) >= 3 and not len(digits) % 2 else None
+        body = bytes(octet or 0 for octet in pairs)
+        renamed = self.rtu.damaged_pdu(body)
+        new = [*renamed, *([] if sent is None else [sent + sum(body) - sum(renamed) & 0xFF])]
+        old = [*pairs, *([] if sent is None else [sent])]
+        result = bytearray(octets)
+        for at, (was, becomes) in enumerate(zip(old, new, strict=True)):
+            if was is not None and was != becomes:
+                result[1 + 2 * at : 3 + 2 * at] = b"%02X" % becomes
+        return bytes(result)

@@ -1,11 +1,11 @@
 """A capture without names: station addresses renumbered, texts replaced, checks made right again.
 
 Every octet stays an octet at its time, so framing, gaps, pairs, damage and findings stay what they were; only who it
-was and what it is called is gone. Renamed are: addresses in all frames, identification and texts in good
+was and what it is called is gone. Renamed are: addresses and texts in all frames, identification in good
 ones (how, each protocol's manifest says); what events of the line say in words (ports that went and came back, notes)
 is left out. Values of points are kept: they are what a reader needs.
 
-A damaged frame keeps its damage: only its address is renumbered, where its place is known.
+A damaged frame keeps its damage: its address is renumbered and its texts are blanked where their places are known.
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from dissectors.bacnet.renamer import MstpRenamer
-from dissectors.checksums import crc8_mstp, crc16_modbus
+from dissectors.checksums import crc8_mstp, crc16_modbus, crc16_x25, lrc
 from dissectors.frame import Check, Damage, FoundBy, Frame
-from dissectors.modbus.renamer import RtuRenamer
+from dissectors.modbus.renamer import AsciiRenamer, RtuRenamer
 from dissectors.pseudonyms import inflicted
 
 WHOLE = bytes.fromhex("55ff00090100000000")[:8]
@@ -53,3 +53,56 @@ def test_the_error_of_a_modbus_crc_stays() -> None:
     renamed = rename(_frame(body + sent, Check.BAD, Damage.CHECK))
     assert renamed[0] == new
     assert int.from_bytes(renamed[-2:], "little") ^ crc16_modbus(renamed[:-2]) == 0x0140
+
+
+NAME = b"Room 214, Mr Smith's own controller"
+
+
+def test_a_damaged_mstp_frame_loses_its_texts_and_keeps_its_error() -> None:
+    data = bytes.fromhex("010030010c02000007194d3e752400") + NAME + b"\x3f"
+    header = bytes([6, 1, 2, 0, len(data)])
+    front = b"\x55\xff" + header + bytes([crc8_mstp(header)])
+    check = (crc16_x25(data) ^ 0x1248).to_bytes(2, "little")
+    renamed = MstpRenamer()(_frame(front + data + check, Check.BAD, Damage.CHECK))
+    assert NAME[:4] not in renamed
+    assert int.from_bytes(renamed[-2:], "little") ^ crc16_x25(renamed[8:-2]) == 0x1248
+    for torn in (front + data[:30], front + data[:30] + b"U\xff" + data[30:]):
+        renamed = MstpRenamer()(_frame(torn, Check.BAD, Damage.RESTARTED))
+        assert len(renamed) == len(torn)
+        assert renamed.count(b"\x55\xff") == torn.count(b"\x55\xff")
+        assert NAME[:4] not in renamed
+
+
+def test_a_damaged_modbus_answer_loses_its_texts_and_keeps_its_error() -> None:
+    answer = bytes([3, 17, len(NAME) + 1]) + NAME + b"\xff"
+    check = (crc16_modbus(answer) ^ 0x0140).to_bytes(2, "little")
+    renamed = RtuRenamer()(_frame(answer + check, Check.BAD, Damage.CHECK))
+    assert renamed[:3] == answer[:3]
+    assert NAME[:4] not in renamed
+    assert int.from_bytes(renamed[-2:], "little") ^ crc16_modbus(renamed[:-2]) == 0x0140
+    assert NAME[:4] not in RtuRenamer()(_frame(answer[:20], Check.BAD, Damage.SHORT))
+
+    line = b":" + (answer + bytes([lrc(answer) ^ 1])).hex().upper().encode() + b"\r\n"
+    renamed = AsciiRenamer()(_frame(line, Check.BAD, Damage.CHECK))
+    body = bytes.fromhex(renamed[1:-2].decode())
+    assert NAME[:4] not in body
+    assert lrc(body[:-1]) + (lrc(answer) ^ 1) - lrc(answer) & 0xFF == body[-1]
+    spoilt = line[:5] + b"?" + line[6:40]
+    renamed = AsciiRenamer()(_frame(spoilt, Check.BAD, Damage.FORM))
+    assert (len(renamed), renamed[:7]) == (len(spoilt), spoilt[:7])
+    assert NAME[4:8].hex().upper().encode() not in renamed
+
+
+def test_a_count_that_could_be_a_letter_stays_a_count() -> None:
+    """Of a text of 32 characters and more the octet before it is printable, too."""
+    server = bytes([3, 17, len(NAME) + 1]) + NAME + b"\xff"
+    objects = bytes([0, len(NAME)]) + NAME + bytes([1, 5]) + b"M-400" + bytes([2, len(NAME)]) + NAME
+    identity = bytes([3, 43, 14, 1, 1, 0, 0, 3]) + objects
+    for answer in (server, identity):
+        frame = _frame(answer + crc16_modbus(answer).to_bytes(2, "little"), Check.GOOD, None)
+        renamed = RtuRenamer()(frame)
+        blank = [number for number, octet in enumerate(answer) if renamed[number] == ord("x") != octet]
+        assert NAME[:4] not in renamed
+        assert len(blank) >= len(NAME) - 3
+        counts = (2,) if answer is server else (8, 9, 10 + len(NAME), 11 + len(NAME), 17 + len(NAME), 18 + len(NAME))
+        assert [renamed[at] for at in counts] == [answer[at] for at in counts]
