@@ -11,6 +11,7 @@ import shutil
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -76,12 +77,13 @@ def _once(args: argparse.Namespace, index: Index | None) -> int:
         for day in known or ():
             _add(args, archive, day)
     _read(args, index, archive, missing, len(tasks))
-    before = index.said_before() if index is not None else None
+    before = index.said_before(args.folders) if index is not None else None
     said = answer(archive, before, {name: registry.get(name).noun for name in registry.names()})
-    if index is not None:
-        index.say(marks(said))
-        if args.since is None:
-            index.forget_all_but(tasks)
+    if args.since is not None:  # what was not looked at is not gone, and the next whole run is to know it
+        said = replace(said, gone=())
+    elif index is not None:
+        index.say(args.folders, marks(said))
+        index.forget_all_but(tasks)
     _write(args, archive, said)
     if archive.unreadable:
         return UNREADABLE

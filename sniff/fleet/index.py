@@ -125,17 +125,17 @@ class Index:
             files = base.execute("SELECT path FROM file").fetchall()
             base.executemany("DELETE FROM file WHERE path = ?", [one for one in files if one[0] not in paths])
 
-    def said_before(self) -> set[str] | None:
-        """What the run before named as wrong; None where there was none."""
+    def said_before(self, folders: Iterable[str]) -> set[str] | None:
+        """What the run before over the same folders named as wrong; None where there was none."""
         with self._reach() as base:
-            found = base.execute("SELECT value FROM said WHERE name = 'findings'").fetchone()
+            found = base.execute("SELECT value FROM said WHERE name = ?", (_asked(folders),)).fetchone()
         return None if found is None else set(json.loads(found[0]))
 
-    def say(self, findings: Iterable[str]) -> None:
+    def say(self, folders: Iterable[str], findings: Iterable[str]) -> None:
         """Keep what this run names, for the next."""
         with self._reach() as base:
             value = json.dumps(sorted(findings))
-            base.execute("INSERT OR REPLACE INTO said VALUES ('findings', ?)", (value,))
+            base.execute("INSERT OR REPLACE INTO said VALUES (?, ?)", (_asked(folders), value))
 
     @contextmanager
     def _reach(self) -> Iterator[sqlite3.Connection]:
@@ -144,6 +144,11 @@ class Index:
                 yield base
         except sqlite3.Error as error:
             raise CaptureError(f"{self.path}: the index cannot be used: {error}") from None
+
+
+def _asked(folders: Iterable[str]) -> str:
+    """What a run was about: a run over less names less, and nothing is gone for that."""
+    return json.dumps(["findings", *sorted({str(Path(folder).absolute()) for folder in folders})])
 
 
 def _days(text: str) -> list[BusDay] | None:

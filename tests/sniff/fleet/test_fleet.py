@@ -314,7 +314,7 @@ def test_two_runs_at_once_do_not_harm_the_index(tmp_path: Path) -> None:
         for task in mine:
             index.put(task, [])
             index.flush()
-        index.say(["something"])
+        index.say(["folder"], ["something"])
 
     threads = [Thread(target=run, args=(tasks[at::2] + tasks[:3],)) for at in (0, 1)]
     for thread in threads:
@@ -322,7 +322,7 @@ def test_two_runs_at_once_do_not_harm_the_index(tmp_path: Path) -> None:
     for thread in threads:
         thread.join()
     assert all(found is not None for _, found in Index(path).known(tasks))
-    assert Index(path).said_before() == {"something"}
+    assert Index(path).said_before(["folder"]) == {"something"}
 
 
 def test_what_is_known_of_a_file_is_forgotten_when_it_changes(made: Made, tmp_path: Path) -> None:
@@ -386,6 +386,25 @@ def test_a_recording_of_several_buses_is_several_buses(made: Made, tmp_path: Pat
         survey(capture, capture.session, alone)
         day = told[capture.session.bus]
         assert (day.summary.frames, day.summary.octets, day.notes) == (alone.frames, alone.octets, ())
+
+
+def test_what_was_not_looked_at_is_neither_gone_nor_new(
+    made: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = str(made[0] / "north")
+    asked = ["fleet", "--workers", "1", "--json", "--index", str(tmp_path / "x.sqlite")]
+
+    def told(*more: str) -> list[dict[str, object]]:
+        main([*asked, *more])
+        return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+
+    told(folder)
+    for less in (("--since", "2030-01-01", folder), (f"{folder}/trunk-00",)):
+        assert not [one for one in told(*less) if "gone" in one]
+    again = told(folder)
+    assert not [one for one in again if "gone" in one]
+    findings = [one for bus in again for one in bus.get("findings", ())]  # type: ignore[attr-defined]
+    assert {one["since_last_run"] for one in findings} == {"stays"}
 
 
 def test_since_leaves_out_days_before_it(made: Made, capsys: pytest.CaptureFixture[str]) -> None:
