@@ -130,13 +130,25 @@ def protocol(name: str) -> str:
 
 def duration(text: str) -> float:
     """argparse type for a duration in seconds: "90", "90s", "5m", "2h"."""
+    seconds = _seconds(text)
+    if not seconds:
+        raise argparse.ArgumentTypeError(f"duration {text!r}: expected more than nothing")
+    return seconds
+
+
+def margin(text: str) -> float:
+    """argparse type for a duration that may be none."""
+    return _seconds(text)
+
+
+def _seconds(text: str) -> float:
     units = {"s": 1, "m": 60, "h": 3600, "d": 86400}
     number, factor = (text[:-1], units[text[-1]]) if text[-1:] in units else (text, 1)
     try:
         seconds = float(number) * factor
     except ValueError:
         seconds = -1.0
-    if not 0 < seconds < 10 * 365 * 86400:
+    if not 0 <= seconds < 10 * 365 * 86400:
         raise argparse.ArgumentTypeError(f"duration {text!r}: expected seconds, or a number with s, m, h or d")
     return seconds
 

@@ -24,7 +24,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frames", metavar="A-B", help="these frames")
     parser.add_argument("--around", metavar="CODE", help="around the evidence of a finding")
     parser.add_argument(
-        "--margin", type=arguments.duration, default=None, metavar="TIME", help="more on both sides (--around: 2s)"
+        "--margin", type=arguments.margin, default=None, metavar="TIME", help="more on both sides (--around: 2s)"
     )
 
 

@@ -108,9 +108,10 @@ def _show(args: argparse.Namespace) -> int:
         for entry in profile.entries:
             print(json_output.dumps(_as_json(entry)))
         return 0
-    print(f"{profile.name}: {profile.title} ({profile.vendor}; {', '.join(profile.models)})")
+    maker = "; ".join(filter(None, (profile.vendor, ", ".join(profile.models))))
+    print(f"{profile.name}: {profile.title}" + (f" ({maker})" if maker else ""))
     print(f"protocols: {', '.join(profile.protocols)}")
-    print(f"source: {profile.source}")
+    print(f"source: {profile.source or 'none is said'}")
     for family, limits in profile.limits.items():
         if limits.frame is not None:
             print(f"{family} longest frame: {limits.frame} octets")
@@ -315,9 +316,9 @@ def _nothing_to_draft(args: argparse.Namespace, series: RegisterSeries, stations
     of = "registers" if args.table is None else f"{args.table} registers"
     objects = {kind for station, kinds in series.objects.items() if args.station in (None, station) for kind in kinds}
     if objects and not stations:
-        who = "nobody" if args.station is None else f"station {args.station}"
+        said = f"nobody answered {of}" if args.station is None else f"station {args.station} answered no {of}"
         kinds = ", ".join(sorted(objects)[:4])
-        return f"{who} answered {of}, only other things ({kinds}); `sniff485 points` shows their values"
+        return f"{said}, only other things ({kinds}); `sniff485 points` shows their values"
     if not stations:
         return f"nobody answered a read of {of}; a draft is made of answers"
     others = f"station{'s' * (len(stations) > 1)} {', '.join(map(str, stations))} did"

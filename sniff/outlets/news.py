@@ -34,12 +34,13 @@ class _Known:
     severity: Severity
     is_over: bool = False
     told: int | None = None  # ns, when it was told last
+    waits: NewsKind | None = None  # for its time
     held_back: int = 0
 
 
 class NewsDesk:
-    """`least`: findings below are nobody's business. `every`: ns between two words about the same finding; what is held
-    back is counted, and told with the next."""
+    """`least`: findings below are nobody's business. `every`: ns between two words about the same finding; its last
+    change is told when they are over, those before it are counted. What becomes graver is told at once."""
 
     def __init__(self, least: Severity, every: int) -> None:
         self._least = least
@@ -56,11 +57,9 @@ class NewsDesk:
         for finding in findings:
             if finding.severity < self._least or finding.cause is not None:
                 continue  # a consequence is told with its cause
-            what = self._what(finding, now)
-            if what is not None:
-                news = self._rationed(what, finding, now)
-                if news is not None:
-                    told.append(news)
+            news = self._rationed(self._what(finding, now), finding, now)
+            if news is not None:
+                told.append(news)
         return told
 
     def _what(self, finding: Finding, now: int) -> NewsKind | None:
@@ -77,10 +76,16 @@ class NewsDesk:
         worse, known.severity = finding.severity > known.severity, max(known.severity, finding.severity)
         return NewsKind.WORSE if worse else None
 
-    def _rationed(self, what: NewsKind, finding: Finding, now: int) -> News | None:
+    def _rationed(self, what: NewsKind | None, finding: Finding, now: int) -> News | None:
         known = self._known[finding.key]
-        if known.told is not None and now - known.told < self._every:
-            known.held_back += 1
+        if what is not None:
+            known.held_back += known.waits is not None
+            known.waits = what
+        if known.waits is None:
             return None
-        held_back, known.held_back, known.told = known.held_back, 0, now
-        return News(what, finding, held_back)
+        early = known.told is not None and now - known.told < self._every
+        if early and known.waits is not NewsKind.WORSE:  # which happens but once a grade
+            return None
+        news = News(known.waits, finding, known.held_back)
+        known.waits, known.held_back, known.told = None, 0, now
+        return news

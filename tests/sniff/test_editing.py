@@ -171,6 +171,12 @@ def test_cut_around_a_finding_holds_its_evidence(tmp_path: Path, sniff485: Calla
     assert len(read_capture(part).rows) < len(read_capture(whole).rows)
 
 
+def test_a_margin_may_be_nothing(tmp_path: Path, sniff485: Callable[..., tuple[int, str, str]]) -> None:
+    whole, part = OURS / "rtu-usual-faults.cap.txt", tmp_path / "part.mcap"
+    assert sniff485("cut", whole, "-o", part, "--around", "MB008", "--margin", "0s")[0] == 0
+    assert len(read_capture(part).rows) < 5
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

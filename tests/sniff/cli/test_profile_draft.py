@@ -126,12 +126,26 @@ def test_stations_of_two_families_are_no_profile(sniff485: Callable[..., Any]) -
     assert "captures/n2-clean.cap.txt: n2" in ran.err
 
 
-@pytest.mark.parametrize("protocol", ["n2", "mstp"])
-def test_who_has_no_registers_is_told_where_the_values_are(sniff485: Callable[..., Any], protocol: str) -> None:
+@pytest.mark.parametrize(("protocol", "station"), [("n2", 1), ("mstp", 5)])
+def test_who_has_no_registers_is_told_where_the_values_are(
+    sniff485: Callable[..., Any], protocol: str, station: int
+) -> None:
     ran = sniff485("profile", "draft", f"captures/{protocol}-clean.cap.txt")
     assert ran.code == 3
     assert "sniff485 points" in ran.err
     assert "AO" in ran.err or "analog-output" in ran.err
+    assert ": nobody answered registers, only other things" in ran.err
+    ran = sniff485("profile", "draft", f"captures/{protocol}-clean.cap.txt", "--station", station)
+    assert f": station {station} answered no registers, only other things" in ran.err
+
+
+def test_a_draft_that_says_no_maker_shows_none(sniff485: Callable[..., Any], tmp_path: Path) -> None:
+    capture, draft = tmp_path / "meter.cap.txt", tmp_path / "meter.toml"
+    meter(capture)
+    assert sniff485("profile", "draft", capture, "-w", draft).code == 0
+    shown = sniff485("profile", "show", draft).out.splitlines()
+    assert shown[0] == "device: device (draft)"
+    assert "source: none is said" in shown
 
 
 def test_requests_without_answers_are_no_draft(sniff485: Callable[..., Any], tmp_path: Path) -> None:

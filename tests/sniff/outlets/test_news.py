@@ -48,3 +48,22 @@ def test_what_is_held_back_is_counted() -> None:
 def test_each_finding_has_its_own_ration() -> None:
     desk = NewsDesk(Severity.WARNING, 10**15)
     assert len(desk.look([FOUND, replace(FOUND, subject="station 4")], 11 * S)) == 2
+
+
+def test_what_becomes_graver_is_told_at_once() -> None:
+    """A station that was asked once is a note; a second later it is an error, which nobody may miss."""
+    desk = NewsDesk(Severity.INFO, 60 * S)
+    desk.look([replace(FOUND, severity=Severity.NOTE)], 11 * S)
+    (news,) = desk.look([replace(FOUND, severity=Severity.ERROR, last=12 * S)], 12 * S)
+    assert (news.what, news.finding.severity) == (NewsKind.WORSE, Severity.ERROR)
+
+
+def test_what_is_over_is_told_when_its_time_comes() -> None:
+    """Seen once, it is over a moment before the next word about it is allowed."""
+    desk = NewsDesk(Severity.INFO, OVER_AFTER)
+    desk.look([FOUND], 11 * S)
+    over = FOUND.last + OVER_AFTER + 1
+    assert desk.look([FOUND], over) == []
+    (news,) = desk.look([FOUND], 11 * S + OVER_AFTER)
+    assert (news.what, news.held_back) == (NewsKind.GONE, 0)
+    assert desk.look([FOUND], 12 * S + 2 * OVER_AFTER) == []
