@@ -23,7 +23,8 @@ class Node:
     """One station. Times are ns; `damaged` counts frames from it that were not good, and those to it of unknown sender.
 
     `verdicts`: of requests and data to it. Tokens and polls for masters are `passed` to it instead; a token that it did
-    not use is `unused`, and no request without answer.
+    not use is `unused`, and no request without answer. `errors`: what was wrong with answers; not with the requests,
+    which are somebody else's frames.
     """
 
     address: int
@@ -145,7 +146,7 @@ class NodeTable:
         else:
             node.verdicts[transaction.verdict] += 1
         node.kinds[transaction.kind] += 1
-        if transaction.error:
+        if transaction.error and transaction.verdict is not Verdict.DAMAGED_REQUEST:
             node.errors[transaction.error] += 1
         if transaction.latency is not None and transaction.verdict is not Verdict.DATA:  # the use of a token is none
             node.latency.add(transaction.latency.nominal)
@@ -201,7 +202,7 @@ class NodeTable:
             else:
                 node.verdicts[VERDICTS[verdict]] += count
             node.kinds[name] += count
-            if error:
+            if error and VERDICTS[verdict] is not Verdict.DAMAGED_REQUEST:
                 node.errors[closed.names[error]] += count
         timed = of_station & (closed.latency != NONE) & (closed.verdict != VERDICTS.index(Verdict.DATA))
         add_grouped(lambda address: self._node(address).latency, closed.station[timed], closed.latency[timed])
