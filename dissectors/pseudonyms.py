@@ -71,6 +71,11 @@ MOST_BLANKS = 10_000
 """Texts of one length that are told apart."""
 
 
+def is_blank(text: str) -> bool:
+    """Whether a text may be the blank of another: it says nothing of what stood there."""
+    return len(text) >= SHORTEST_TEXT and not text.rstrip("abcdefghij").strip(chr(BLANK)) and text[0] == chr(BLANK)
+
+
 def _blank(text: bytes) -> bytes:
     return bytes([BLANK]) * len(text)
 

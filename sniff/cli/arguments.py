@@ -153,6 +153,13 @@ def _seconds(text: str) -> float:
     return seconds
 
 
+def tcp_port(text: str) -> int:
+    """argparse type for a TCP port; 0 is any free one."""
+    if not (text.isascii() and text.isdigit() and len(text) < 6 and int(text) < 1 << 16):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a port, 0 to 65535")
+    return int(text)
+
+
 def positive(text: str) -> int:
     """argparse type for how many."""
     if not (text.isascii() and text.isdigit() and int(text) > 0):

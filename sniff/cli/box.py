@@ -33,7 +33,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--keep-free", type=arguments.octets, metavar="SIZE", help="keep so much of the disk free; default: 1GB"
     )
     parser.add_argument(
-        "--status-port", type=arguments.whole, metavar="PORT", help="the status page on the loopback, too (/, /status)"
+        "--status-port",
+        type=arguments.tcp_port,
+        metavar="PORT",
+        help="the status page on the loopback, too (/, /status)",
     )
     parser.add_argument("--socket", metavar="PATH", help="of the status page; default: NAME.sock in /run/sniff485")
     parser.add_argument("--json", action="store_true", help="status as one JSON object")

@@ -51,7 +51,9 @@ def run(args: argparse.Namespace) -> int:
             filtering.surveyed(args, capture, session, taken, devices=model.devices)
             summary, points = taken, tuple(counted.points)
         findings = filtering.shown_findings(args, capture, session, model.findings(), model.devices)
-        sides.append(Side(path, summary, findings, session.adapter.latency, points))
+        line = "" if session.line_is_assumed else str(session.line)
+        title = dissector_for(session).title
+        sides.append(Side(path, summary, findings, session.adapter.latency, points, title, line))
     found = list(differences(*sides))
     rows = [(one.subject, one.what, one.before, one.after) for one in found]
     if rows or args.style != "text":

@@ -42,7 +42,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--host", default="127.0.0.1", metavar="ADDRESS", help="address to serve at (default 127.0.0.1)"
     )
-    parser.add_argument("--port", type=arguments.whole, default=PORT, metavar="N", help="default 8485; 0: any free one")
+    parser.add_argument(
+        "--port", type=arguments.tcp_port, default=PORT, metavar="N", help="default 8485; 0: any free one"
+    )
     parser.add_argument("--allow-remote", action="store_true", help="let others than this machine look; needs a token")
     parser.add_argument(
         "--token-file", metavar="FILE", help=f"what viewers must know, at least 16 characters; default: {TOKEN_ENV}"

@@ -24,7 +24,8 @@ COMPARED_VERDICTS = (Verdict.NO_RESPONSE, Verdict.EXCEPTION, Verdict.DAMAGED_ANS
 class Side:
     """One capture: what was counted and found in it. `latency`: ns that its adapter may hold octets back.
 
-    `points`: the values of its stations, as `PointTable` gives them.
+    `points`: the values of its stations, as `PointTable` gives them. `protocol`: its title; `line`: its settings; empty
+    where nobody knows them.
     """
 
     name: str
@@ -32,6 +33,8 @@ class Side:
     findings: tuple[Finding, ...]
     latency: int
     points: tuple[Point, ...] = ()
+    protocol: str = ""
+    line: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +64,9 @@ def differences(before: Side, after: Side) -> Iterator[Difference]:
 
 
 def _bus(before: Side, after: Side) -> Iterator[Difference]:
+    for name, was, now in (("protocol", before.protocol, after.protocol), ("line settings", before.line, after.line)):
+        if was and now and was != now:
+            yield Difference("bus", name, was, now)
     shares = (
         ("load", before.counts.load.overall(), after.counts.load.overall()),
         ("damaged frames", _share(before.counts.damaged, before.counts.frames),
@@ -85,7 +91,11 @@ def _node(subject: str, old: Node, new: Node, doubt: int) -> Iterator[Difference
         if abs(was_time - now_time) > max(doubt, was_time // 10):
             yield Difference(subject, name, milliseconds(was_time), milliseconds(now_time))
     for kind in sorted(old.kinds.keys() ^ new.kinds.keys()):
-        yield Difference(subject, kind, f"{old.kinds[kind]} times", f"{new.kinds[kind]} times")
+        yield Difference(subject, kind, _times(old.kinds[kind]), _times(new.kinds[kind]))
+
+
+def _times(count: int) -> str:
+    return "never" if not count else "once" if count == 1 else f"{count} times"
 
 
 def _values(before: Side, after: Side) -> Iterator[Difference]:

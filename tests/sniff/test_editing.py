@@ -267,6 +267,23 @@ def test_diff_names_the_station_that_went_bad(sniff485: Callable[..., tuple[int,
     assert not any(one["subject"] == "station 1" and "response" in one["what"] for one in found)
 
 
+def test_diff_of_other_protocols_and_rates_says_so_first(sniff485: Callable[..., tuple[int, str, str]]) -> None:
+    out = sniff485("diff", "--json", OURS / "rtu-clean.cap.txt", OURS / "mstp-clean.cap.txt")[1]
+    first, second, *_ = [json.loads(line) for line in out.splitlines()]
+    assert (first["what"], first["before"], first["after"]) == ("protocol", "Modbus RTU", "BACnet MS/TP")
+    assert (second["what"], second["before"], second["after"]) == ("line settings", "19200,8E1", "38400,8N1")
+
+
+def test_a_blanked_name_is_no_other_name(tmp_path: Path, sniff485: Callable[..., tuple[int, str, str]]) -> None:
+    whole, part = OURS / "devices/bacnet-three-objects.cap.txt", tmp_path / "part.cap.txt"
+    assert sniff485("anonymise", whole, "-o", part)[0] == 0
+
+    def found(path: Path) -> list[str]:
+        return [json.loads(line)["code"] for line in sniff485("check", "--json", path)[1].splitlines()]
+
+    assert found(part) == found(whole)
+
+
 def polled(path: Path, values: list[tuple[int, int]]) -> Path:
     """A capture in which unit 1 tells its registers 2523h and 2524h, again and again."""
     lines = ["#!sniff-capture 1", "# line: 9600,8N1", "# protocol: modbus-rtu", "# device: 1=teco-e510"]
