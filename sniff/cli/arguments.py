@@ -230,7 +230,15 @@ def open_buses(path: str) -> list[tuple[str, Capture]]:
 
 def open_captures(paths: Sequence[str]) -> list[tuple[str, Capture]]:
     """Open captures by name, the parts of one recording as one; ends as `open_capture` does."""
-    opened = [one for path in paths for one in open_buses(path)]
+    return _joined([one for path in paths for one in open_buses(path)])
+
+
+def open_parts(paths: Sequence[str]) -> list[tuple[str, Capture]]:
+    """The same where all are of one bus: of a file with several, --bus must choose."""
+    return _joined([(path, open_capture(path)) for path in paths])
+
+
+def _joined(opened: list[tuple[str, Capture]]) -> list[tuple[str, Capture]]:
     if len(opened) > 1:
         from sniff.recording.rotated import joined
 

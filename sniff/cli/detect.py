@@ -8,6 +8,7 @@ code 0 when found, 3 when not.
 from __future__ import annotations
 
 import argparse
+import shlex
 from dataclasses import replace
 
 from dissectors import registry
@@ -63,7 +64,8 @@ def of_file(args: argparse.Namespace) -> int:
         if args.json:
             print(json_output.dumps(to_json(name, outcome)))
         else:
-            write(name, outcome, told, open_with="open")
+            of_several = "" if name == args.port else f" --bus {shlex.quote(sanitized(capture.session.bus))}"
+            write(name, outcome, told, f"open {sanitized(args.port)}{of_several}")
     return 0 if found else UNREADABLE
 
 
@@ -93,9 +95,9 @@ def _of_session(args: argparse.Namespace, session: Session) -> tuple[Outcome, st
     return Outcome(ending, replace(reading, line=line), 1, octets, cannot), also
 
 
-def write(port: str, outcome: Outcome, also: str = "", open_with: str = "live") -> None:
-    """Print for people."""
-    if open_with != "live" and outcome.reading is None:
+def write(port: str, outcome: Outcome, also: str = "", opened: str = "") -> None:
+    """Print for people. `opened`: of a file, by which command it is looked at."""
+    if opened and outcome.reading is None:
         print(f"{sanitized(port)}: {_of_no_protocol(outcome)}")
         return
     print(f"{sanitized(port)}: {sentence(outcome)}")
@@ -107,10 +109,10 @@ def write(port: str, outcome: Outcome, also: str = "", open_with: str = "live") 
         print(f"  {also}")
     for words in outcome.cannot_tell:
         print(f"  cannot tell {words}")
-    if open_with == "live":
-        print(f"  next: sniff485 live {sanitized(port)} -s {reading.line} -p {reading.protocol}")
+    if opened:
+        print(f"  next: sniff485 {opened} -p {reading.protocol}")
     else:
-        print(f"  next: sniff485 {open_with} {sanitized(port)} -p {reading.protocol}")
+        print(f"  next: sniff485 live {sanitized(port)} -s {reading.line} -p {reading.protocol}")
 
 
 def _of_no_protocol(outcome: Outcome) -> str:

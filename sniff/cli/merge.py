@@ -24,7 +24,7 @@ def run(args: argparse.Namespace) -> int:
     """Merge by time."""
     from sniff.editing.merging import merged, merged_session
 
-    opened = arguments.open_captures(args.files)
+    opened = arguments.open_parts(args.files)
     captures = [capture for _, capture in opened]
     try:
         session = merged_session(captures, [name for name, _ in opened])

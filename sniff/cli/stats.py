@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     if len(files) > 1 and stray:
         hint = "; values have a command of their own: points" if "points" in stray else ""
         raise Failure(f"{stray[0]}: neither a file nor a table; tables are {', '.join(TABLES)}{hint}", USAGE)
-    opened = arguments.open_captures(files)
+    opened = arguments.open_parts(files)
     _of_captures(args, table, opened)
     for name, capture in opened:
         say_incomplete(name, capture)

@@ -121,6 +121,11 @@ def test_each_connection_is_a_bus(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert len(capture.buses) == 3
     assert "192.0.2.9:4001" in capture.names
     assert "192.0.2.1:40001-192.0.2.9:8899" in capture.names
+    for command in (["stats", str(path)], ["stats", str(path), "polls"], ["merge", str(path), "-o", f"{path}.mcap"]):
+        assert main(command) == 2  # they are of one bus: what three make together is nobody's
+        assert "3 buses in it" in capsys.readouterr().err
+    main(["detect", str(path)])
+    assert f"next: sniff485 open {path} --bus 192.0.2.9:4001 -p " in capsys.readouterr().out
     assert main(["show", str(path), "--bus", "192.0.2.1:40000-192.0.2.9:8899", "--json"]) == 0
     assert capsys.readouterr().out.count('"ok": true') == 16
     assert "TCP port 80" in capture.completeness().text
