@@ -388,25 +388,6 @@ def test_a_recording_of_several_buses_is_several_buses(made: Made, tmp_path: Pat
         assert (day.summary.frames, day.summary.octets, day.notes) == (alone.frames, alone.octets, ())
 
 
-def test_what_was_not_looked_at_is_neither_gone_nor_new(
-    made: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = str(made[0] / "north")
-    asked = ["fleet", "--workers", "1", "--json", "--index", str(tmp_path / "x.sqlite")]
-
-    def told(*more: str) -> list[dict[str, object]]:
-        main([*asked, *more])
-        return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-
-    told(folder)
-    for less in (("--since", "2030-01-01", folder), (f"{folder}/trunk-00",)):
-        assert not [one for one in told(*less) if "gone" in one]
-    again = told(folder)
-    assert not [one for one in again if "gone" in one]
-    findings = [one for bus in again for one in bus.get("findings", ())]  # type: ignore[attr-defined]
-    assert {one["since_last_run"] for one in findings} == {"stays"}
-
-
 def test_since_leaves_out_days_before_it(made: Made, capsys: pytest.CaptureFixture[str]) -> None:
     main(["fleet", "--no-index", "--workers", "1", "--json", "--since", "2026-03-03", str(made[0] / "north")])
     said = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
