@@ -5,10 +5,13 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from sniff.cli import USAGE, Failure, arguments, filtering, writing
 from sniff.cli.incomplete import say_incomplete
 from sniff.cli.progress import Watched
+from sniff.engine.read_source import ReadSource
+from sniff.engine.session import LineEvent
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -53,9 +56,19 @@ def run(args: argparse.Namespace) -> int:
         raise Failure(str(error), USAGE) from None
     margin = args.margin if args.margin is not None else 2.0 if args.around else 0.0
     stretch = stretch.widened(int(margin * 1e9))
-    source = filtering.sifted(args, capture, session)
-    count = writing.write(args, session, cutting.CutOut(source, stretch, session.line.char), [args.file])
-    if not count:
-        raise Failure(f"{args.file}: nothing in that stretch; {args.output} is empty", USAGE)
+    cut = cutting.CutOut(filtering.sifted(args, capture, session), stretch, session.line.char)
+    nothing = Failure(f"{args.file}: nothing in that stretch; nothing is written", USAGE)
+    output = Path(args.output)
+    if args.force and output.is_file() and _is_empty(cut):  # what is there is lost as soon as writing begins
+        raise nothing
+    if not writing.write(args, session, cut, [args.file]):
+        if output.is_file():
+            output.unlink()
+        raise nothing
     say_incomplete(args.file, capture)
     return 0
+
+
+def _is_empty(source: ReadSource) -> bool:
+    """Whether it has no octets."""
+    return all(isinstance(item, LineEvent) for item in source.blocks())
