@@ -16,6 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from dissectors import registry
+from dissectors.findings import counted
 from sniff.analysis.sanitizing import sanitized
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, writing
 from sniff.engine.capture import CaptureError
@@ -67,7 +68,13 @@ def run(args: argparse.Namespace) -> int:
 
 def _once(args: argparse.Namespace, index: Index | None) -> int:
     now = time.time_ns()
-    found = [one for one in _find(args) if not is_being_written(one[1], now)]
+    there = _find(args)
+    found = [one for one in there if not is_being_written(one[1], now)]
+    if len(found) < len(there) and not args.watch:  # else its turn comes
+        left = counted(len(there) - len(found), "recording")
+        print(
+            f"sniff485: {left} without an end changed just now, so somebody writes: not looked at yet", file=sys.stderr
+        )
     tasks, unreadable = tasks_of(found, args.since) if index is None else _known_tasks(index, found, args.since)
     archive = Archive(unreadable={one.file.path: one.why for one in unreadable})
     missing = []

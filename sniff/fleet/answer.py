@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import date, timedelta
@@ -48,11 +49,13 @@ class Day:
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """A finding over all days of a bus. `days`: on which it was found, ascending."""
+    """A finding over all days of a bus. `days`: on which it was found, ascending. `alike`: further ones of its rule
+    about the same station that it stands for (other requests, say), on the day with most."""
 
     finding: Finding
     days: tuple[str, ...]
     fresh: Fresh = Fresh.UNKNOWN
+    alike: int = 0
 
 
 class Change(Enum):
@@ -183,14 +186,15 @@ def _bus(days: list[BusDay], newest: str, known: set[str] | None, noun: Mapping[
 
 
 def _troubles(bus: Bus, findings: list[tuple[Finding, ...]], known: set[str] | None) -> Iterator[Trouble]:
-    on: dict[tuple[str, str], list[str]] = {}
+    on: dict[tuple[str, str], Counter[str]] = {}
     for day, found in zip(bus.days, findings, strict=True):
         for one in found:
             if one.severity >= Severity.WARNING:  # on other days it may be a consequence, and is told with its cause
-                on.setdefault(one.key, []).append(day.day)
+                on.setdefault(one.key, Counter())[day.day] += 1
     for finding in merged([one for one in found if one.key in on] for found in findings):
         fresh = Fresh.UNKNOWN if known is None else Fresh.STAYS if mark(bus, finding) in known else Fresh.NEW
-        yield Trouble(finding, tuple(on[finding.key]), fresh)
+        days = on[finding.key]
+        yield Trouble(finding, tuple(days), fresh, max(days.values()) - 1)
 
 
 def _day(day: BusDay, findings: tuple[Finding, ...]) -> Day:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from dataclasses import fields
 from typing import Any
 
 from dissectors.findings import Finding, Severity
@@ -117,7 +118,7 @@ def _histogram_of(value: list[Any]) -> Histogram:
     )
 
 
-_HEARD = ("octets", "in_frames", "rows", "good", "outside", "is_told")
+_HEARD = tuple(field.name for field in fields(Heard))
 _PARTS = ("host", "overall", "line", "bus")
 
 

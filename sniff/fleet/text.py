@@ -122,7 +122,8 @@ def trouble_words(trouble: Trouble, bus: Bus) -> str:
     fresh = " (new)" if trouble.fresh is Fresh.NEW else ""
     many = f", {len(days)} days" if len(days) > 1 else ""
     often = "" if one.is_once else f", {one.count}×"
-    return f"{one.code} {one.subject}{fresh}, {when}{many}{often}: {one.seen}"
+    alike = f" (and {trouble.alike} more like it)" if trouble.alike else ""
+    return f"{one.code} {one.subject}{fresh}, {when}{many}{often}: {one.seen}{alike}"
 
 
 def change_words(change: StationChange, noun: str) -> str:

@@ -79,6 +79,7 @@ def _bus(bus: Bus) -> dict[str, Any]:
                 "next": one.finding.next,
                 "count": one.finding.count,
                 "days": list(one.days),
+                "alike": one.alike,
                 "since_last_run": one.fresh.value or None,
             }
             for one in bus.troubles

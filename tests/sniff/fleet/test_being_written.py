@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from sniff.cli import main
 from sniff.fleet.archive import FileState, is_being_written
 from sniff.recording.scan import MAGIC
 
@@ -36,3 +37,9 @@ def test_a_pipe_is_left_alone(tmp_path: Path) -> None:
     assert not is_being_written(state(path), path.stat().st_mtime_ns)
     assert struct.unpack("i", fcntl.ioctl(both, termios.FIONREAD, bytes(4)))[0] == len(MAGIC), "nobody took anything"
     os.close(both)
+
+
+def test_it_is_said_that_it_was_not_looked_at(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "a.mcap").write_bytes(MAGIC + b"begun")
+    main(["fleet", "--workers", "1", "--no-index", str(tmp_path)])
+    assert "1 recording without an end changed just now" in capsys.readouterr().err
