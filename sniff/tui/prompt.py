@@ -107,7 +107,6 @@ class Prompt(Vertical):
         self._complete: Complete | None = None
         self._before: Sequence[str] = ()
         self._at = 0
-        self._is_answered = False  # and still to be seen
 
     def compose(self) -> ComposeResult:
         """A line to type in and a line that judges it."""
@@ -126,7 +125,7 @@ class Prompt(Vertical):
     ) -> None:
         """Open with a text to edit; `hint` is shown while it is empty. `complete`: ways in which a filter may go on.
         `before`: what was answered earlier, the latest last."""
-        self.purpose, self._is_answered = purpose, False
+        self.purpose = purpose
         self._check, self._complete = check, AskedOnce(complete) if complete is not None else None
         self._before, self._at = before, len(before)
         field = self.query_one(Input)
@@ -178,16 +177,10 @@ class Prompt(Vertical):
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Send the answer when it can be read; stay open when not."""
         event.stop()
-        if self._is_answered or self._judge(event.value):
+        if self._judge(event.value):
             return
-        self._is_answered = True
+        self._close()
         self.post_message(self.Answered(self.purpose, event.value))
-        self.post_message(self.Closed())  # the keys go back at once
-        self.call_after_refresh(self._hide_answered)  # which lays out the whole screen: the answer is painted first
-
-    def _hide_answered(self) -> None:
-        if self._is_answered:  # else something else is asked for by now
-            self.remove_class("open")
 
     def action_cancel(self) -> None:
         """Leave without an answer."""
