@@ -50,7 +50,7 @@ class _Side:
 
 
 class _Teaching:
-    """What all good frames of a block teach; most of them long, each of its chains is learnt by itself.
+    """What all good frames of a block teach, worked out once: its chains, which may be many, are learnt one by one.
 
     A frame that may be either is noted as a request, as the confirmation of a write always is, unless it is the answer
     to the request directly before it.
@@ -91,7 +91,8 @@ class _Teaching:
         if not new:
             return
         known |= new
-        for place in sorted(int(np.argmax(keys == key)) for key in sorted(new)):
+        distinct, first = np.unique(keys, return_index=True)
+        for place in np.sort(first[[key in new for key in distinct.tolist()]]).tolist():
             begin = int(self._answers.begins[which.start + place])
             length = int(self._answers.lengths[which.start + place])
             past.note(self._octets[begin : begin + length].tobytes(), request=False)
