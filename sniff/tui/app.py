@@ -10,7 +10,7 @@ from pathlib import PurePath
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
-from textual.events import Event, InputEvent
+from textual.events import Event, InputEvent, Key
 from textual.filter import DimFilter
 from textual.screen import Screen
 from textual.timer import Timer
@@ -363,6 +363,10 @@ class SnifferApp(Analyzer):
         """Filters work on every screen."""
         if message.purpose == "filter":
             self.filter(message.text)
+
+    def on_prompt_key_behind(self, message: Prompt.KeyBehind) -> None:
+        """Press it again, where the keys are now; a key of the app's own, since one of a screen stops there."""
+        self.post_message(Key(message.key, message.character))
 
 
 def _mode(name: str, bus: int) -> str:

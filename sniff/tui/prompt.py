@@ -9,6 +9,7 @@ from typing import ClassVar
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
+from textual.events import Key
 from textual.message import Message
 from textual.suggester import Suggester
 from textual.widgets import Input, Label
@@ -78,6 +79,19 @@ class PromptField(Input):
         Binding("enter", "submit", "accept", tooltip="accept what was typed"),
     ]
 
+    async def _on_key(self, event: Key) -> None:
+        """A key behind the answer is no part of it: enter answers here, not when it has bubbled up to the bindings."""
+        prompt = self.parent
+        assert isinstance(prompt, Prompt)
+        if not prompt.is_asking:
+            prompt.hand_on(event)
+        elif event.key == "enter":
+            prompt.answer(self.value)
+        else:
+            return
+        event.stop()
+        event.prevent_default()
+
 
 class Prompt(Vertical):
     """Hidden until `ask`; enter sends `Answered`, escape hides it again."""
@@ -100,6 +114,14 @@ class Prompt(Vertical):
     class Closed(Message):
         """The prompt was left."""
 
+    class KeyBehind(Message):
+        """A key was pressed behind the answer, before the screen had its keys again; comes after `Closed`."""
+
+        def __init__(self, key: str, character: str | None) -> None:
+            super().__init__()
+            self.key = key
+            self.character = character
+
     def __init__(self) -> None:
         super().__init__()
         self.purpose = ""
@@ -107,6 +129,7 @@ class Prompt(Vertical):
         self._complete: Complete | None = None
         self._before: Sequence[str] = ()
         self._at = 0
+        self._is_answered = False
 
     def compose(self) -> ComposeResult:
         """A line to type in and a line that judges it."""
@@ -125,7 +148,7 @@ class Prompt(Vertical):
     ) -> None:
         """Open with a text to edit; `hint` is shown while it is empty. `complete`: ways in which a filter may go on.
         `before`: what was answered earlier, the latest last."""
-        self.purpose = purpose
+        self.purpose, self._is_answered = purpose, False
         self._check, self._complete = check, AskedOnce(complete) if complete is not None else None
         self._before, self._at = before, len(before)
         field = self.query_one(Input)
@@ -140,8 +163,13 @@ class Prompt(Vertical):
 
     @property
     def is_open(self) -> bool:
-        """Whether it asks."""
+        """Whether it is to be seen."""
         return self.has_class("open")
+
+    @property
+    def is_asking(self) -> bool:
+        """Whether it waits for an answer."""
+        return self.is_open and not self._is_answered
 
     def on_input_changed(self, event: Input.Changed) -> None:
         """Judge every keystroke."""
@@ -175,12 +203,22 @@ class Prompt(Vertical):
             field.cursor_position = len(field.value)
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Send the answer when it can be read; stay open when not."""
+        """Accepted by its binding."""
         event.stop()
-        if self._judge(event.value):
+        self.answer(event.value)
+
+    def answer(self, text: str) -> None:
+        """Send the answer when it can be read; stay open when not."""
+        if not self.is_asking or self._judge(text):
             return
-        self._close()
-        self.post_message(self.Answered(self.purpose, event.value))
+        self._is_answered = True
+        self.post_message(self.Answered(self.purpose, text))
+        self.call_after_refresh(self._close_answered)  # closing lays out the whole screen: what was asked for first
+
+    def hand_on(self, key: Key) -> None:
+        """Give a key to the screen, which has its keys again before it."""
+        self._close_answered()
+        self.post_message(self.KeyBehind(key.key, key.character))
 
     def action_cancel(self) -> None:
         """Leave without an answer."""
@@ -189,6 +227,11 @@ class Prompt(Vertical):
     def action_complete(self) -> None:
         """Take the completion shown."""
         self.query_one(Input).action_cursor_right()
+
+    def _close_answered(self) -> None:
+        """Close, unless it is closed, or open again and asks for something else."""
+        if self.is_open and self._is_answered:
+            self._close()
 
     def _close(self) -> None:
         self.remove_class("open")

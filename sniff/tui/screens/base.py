@@ -91,6 +91,11 @@ class ViewScreen(Screen[None]):
         """Shown (again): catch up."""
         analyzer(self).draw_screen()
 
+    def keys_after_prompt(self) -> Widget:
+        """What has the keys when the prompt is left."""
+        return self.query_one(self.AUTO_FOCUS, Widget)
+
     def on_prompt_closed(self) -> None:
-        """Back to where the keys were."""
-        self.query_one(self.AUTO_FOCUS, Widget).focus()
+        """Back to where the keys were, unless the prompt asks again; at once, for a key may follow."""
+        if not self.query_one(Prompt).is_open:
+            self.set_focus(self.keys_after_prompt())

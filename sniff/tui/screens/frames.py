@@ -332,9 +332,9 @@ class FramesScreen(ListingScreen):
         else:
             super().action_leave()
 
-    def on_prompt_closed(self) -> None:
-        """Back to the list, or to the one pane that is shown."""
-        (self.zoomed or self.lines).focus()
+    def keys_after_prompt(self) -> Widget:
+        """The list, or the one pane that is shown."""
+        return self.zoomed or self.lines
 
     def _zoom(self, pane: Widget | None) -> None:
         self.zoomed = pane
