@@ -84,7 +84,7 @@ class LineFindings:
         self._senders = Senders(session.timing, adapter.packets)
         self._octets = self._in_frames = self._marked = self._low = self._rows = self._frames = self._good = 0
         self._mended: dict[Flaw, tuple[int, int]] = {}  # frames, and octets of them, that are good but for that
-        self._first = self._now = 0
+        self._first = self._now = session.started  # of a capture in which nothing was heard: when it began
         self._damaged = self._damaged_here = 0  # rows that are no good frame, and those of them with an overrun
         self._overruns, self._lost = Tally(), Tally()
         self._unplugged, self._stepped = Tally(), Tally()
@@ -114,7 +114,7 @@ class LineFindings:
         """Take the next row."""
         event = row.event
         if not self._rows:
-            self._first = event.start
+            self._first = self._now = event.start
         self._rows += 1
         self._now = max(self._now, event.end)
         self._octets += len(event.octets)

@@ -162,7 +162,9 @@ def _run(arguments: list[str]) -> int:
     chosen = imported.get(name or "")
     args, unknown = parser.parse_known_args(arguments)
     if unknown and not getattr(chosen, "TOLERANT", False):
-        raise Failure(f"{name}: does not know {' '.join(unknown)}; `sniff485 {name} --help` says what it knows", USAGE)
+        options = [word for word in unknown if word.startswith("-")]  # what stands behind one may be its value
+        said = " ".join(options or unknown)
+        raise Failure(f"{name}: does not know {said}; `sniff485 {name} --help` says what it knows", USAGE)
     assert chosen is not None  # argparse has refused anything else
     return _carried_out(chosen, args)
 

@@ -129,7 +129,7 @@ def protocol(name: str) -> str:
 
 
 def duration(text: str) -> float:
-    """argparse type for a duration in seconds: "90", "90s", "5m", "2h"."""
+    """argparse type for a duration in seconds: "90", "90s", "5m", "2h", "500ms"."""
     seconds = _seconds(text)
     if not seconds:
         raise argparse.ArgumentTypeError(f"duration {text!r}: expected more than nothing")
@@ -141,15 +141,18 @@ def margin(text: str) -> float:
     return _seconds(text)
 
 
+_SECONDS = {"": 1.0, "ms": 0.001, "s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
+
+
 def _seconds(text: str) -> float:
-    units = {"s": 1, "m": 60, "h": 3600, "d": 86400}
-    number, factor = (text[:-1], units[text[-1]]) if text[-1:] in units else (text, 1)
+    number = text.rstrip("smhd")
+    factor = _SECONDS.get(text[len(number) :], 0.0)
     try:
-        seconds = float(number) * factor
+        seconds = float(number) * factor if factor else -1.0
     except ValueError:
         seconds = -1.0
     if not 0 <= seconds < 10 * 365 * 86400:
-        raise argparse.ArgumentTypeError(f"duration {text!r}: expected seconds, or a number with s, m, h or d")
+        raise argparse.ArgumentTypeError(f"duration {text!r}: expected seconds, or a number with ms, s, m, h or d")
     return seconds
 
 

@@ -10,8 +10,6 @@ from pathlib import Path
 from sniff.cli import USAGE, Failure, arguments, filtering, writing
 from sniff.cli.incomplete import say_incomplete
 from sniff.cli.progress import Watched
-from sniff.engine.read_source import ReadSource
-from sniff.engine.session import LineEvent
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -59,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     cut = cutting.CutOut(filtering.sifted(args, capture, session), stretch, session.line.char)
     nothing = Failure(f"{args.file}: nothing in that stretch; nothing is written", USAGE)
     output = Path(args.output)
-    if args.force and output.is_file() and _is_empty(cut):  # what is there is lost as soon as writing begins
+    if args.force and output.is_file() and filtering.is_empty(cut):  # what is there is lost as soon as writing begins
         raise nothing
     if not writing.write(args, session, cut, [args.file]):
         if output.is_file():
@@ -67,8 +65,3 @@ def run(args: argparse.Namespace) -> int:
         raise nothing
     say_incomplete(args.file, capture)
     return 0
-
-
-def _is_empty(source: ReadSource) -> bool:
-    """Whether it has no octets."""
-    return all(isinstance(item, LineEvent) for item in source.blocks())

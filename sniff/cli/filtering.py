@@ -19,7 +19,7 @@ from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import Observer
 from sniff.engine.read_source import ReadSource
-from sniff.engine.session import SECOND_NOTE, Session
+from sniff.engine.session import SECOND_NOTE, LineEvent, Session
 
 if TYPE_CHECKING:
     from sniff.bus.second_proof import SecondProof
@@ -155,6 +155,11 @@ def sifted(args: argparse.Namespace, capture: Capture, session: Session, devices
     from sniff.bus.sifting import Sifted
 
     return Sifted(capture, session, filter_of(args, capture, session, devices))
+
+
+def is_empty(source: ReadSource) -> bool:
+    """Whether it has no octets; reads to the first."""
+    return all(isinstance(item, LineEvent) for item in source.blocks())
 
 
 def shown_findings(

@@ -37,6 +37,8 @@ def run(args: argparse.Namespace) -> int:
     capture = arguments.open_capture(args.file)  # says what is wrong with the file before anything is opened
     arguments.say_assumed(capture.session, args.file)
     played = filtering.sifted(args, capture, capture.session)
+    if args.filter and filtering.is_empty(played):
+        raise Failure(f"{args.file}: no octets of frames that match; nothing to play", USAGE)
     try:
         replay: Replay = (
             PtyReplay(Path(args.file), args.speed)

@@ -50,7 +50,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "words", nargs="+", metavar="FILE", help="captures of one bus; parts of a rotation together; or a port"
     )
     arguments.add_bus(parser)
-    parser.add_argument("--table", choices=TABLES, help="which table; may also stand after the files (default: nodes)")
+    parser.add_argument("--table", choices=TABLES, help="which table; may also stand beside the files (default: nodes)")
     arguments.add_line(parser)
     arguments.add_devices(parser)
     parser.add_argument("--every", type=arguments.duration, metavar="TIME", help="load: length of a row (default: 1s)")
@@ -68,8 +68,12 @@ def run(args: argparse.Namespace) -> int:
     table, files = args.table or "nodes", args.words
     if len(files) > 1 and files[-1] in TABLES:
         table, files = files[-1], files[:-1]
+    elif len(files) > 1 and files[0] in TABLES and not Path(files[0]).exists():
+        table, files = files[0], files[1:]
     if args.every is not None and table != "load":
         raise Failure(f"--every is the length of a row of load, and {table} has none", USAGE)
+    if args.every is not None and args.every % 1:
+        raise Failure(f"--every {args.every:g} s: load is counted by whole seconds; expected 1s or a multiple", USAGE)
     port = watching.port_of(files)
     if port is not None:
         with until_interrupted():  # from before it begins
@@ -263,7 +267,6 @@ def _quantiles(latency: Histogram) -> tuple[Cell, ...]:
 
 
 def _load(summary: Summary, every: int) -> list[tuple[Cell, ...]]:
-    every = max(NS_PER_S, every // NS_PER_S * NS_PER_S)
     spans: dict[int, Second] = {}
     for number, second in summary.load.seconds.items():
         part = spans.setdefault(number * NS_PER_S // every, Second())

@@ -62,6 +62,8 @@ def of_frames(capture: ReadSource, session: Session, text: str, reference: bool 
     if match is None or not (match[1] or match[2]):
         raise ValueError(f"frames {text!r}: expected numbers as 12-40")
     low = int(match[1] or 1)
+    if not low:
+        raise ValueError(f"frames {text!r}: they are counted from 1")
     high = int(match[2]) if match[2] else low if text.strip().isdigit() else FOREVER
     ends = _Ends(low, high)
     survey(capture, session, ends, reference=reference)

@@ -120,3 +120,11 @@ def test_several_captures_are_told_together(poll: Path, sniff485: Any) -> None:
     assert "in 2 of 2 captures" in together
     assert len(together.strip().splitlines()) >= 2
     assert "together" not in sniff485("check", poll).out
+
+
+def test_nothing_heard_has_the_time_of_the_capture(sniff485, tmp_path):
+    path = tmp_path / "silent.cap.txt"
+    path.write_text("#!sniff-capture 1\n# line: 9600,8N1\n# protocol: modbus-rtu\n# start: 2026-03-01T10:00:00Z\n")
+    found = [json.loads(line) for line in sniff485("check", "--json", path).out.splitlines()]
+    assert {one["code"] for one in found} == {"LN001", "LN002"}
+    assert {(one["first"], one["last_ns"]) for one in found} == {("2026-03-01T10:00:00.000000000Z", 0)}

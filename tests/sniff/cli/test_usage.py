@@ -23,6 +23,11 @@ CLEAN = Path(__file__).parents[3] / "captures" / "rtu-clean.cap.txt"
         (("stats", CLEAN, "--duration", "5s"), "sniff485: --duration is for a port; "),
         (("check", CLEAN, "--duration", "5s"), "sniff485: --duration is for a port; "),
         (("points", CLEAN, "--duration", "5s"), "sniff485: --duration is for a port; "),
+        (("stats", CLEAN, "load", "--every", "500ms"), "sniff485: --every 0.5 s: load is counted by whole seconds; "),
+        (("stats", CLEAN, "load", "--every", "5x"), "sniff485 stats: argument --every: duration '5x': expected "),
+        (("cut", CLEAN, "--frames", "0-3", "-o", "x.mcap"), "sniff485: frames '0-3': they are counted from 1"),
+        (("replay", CLEAN, "--to", "tcp", "-Y", "dst == 200"), f"sniff485: {CLEAN}: no octets of frames that match; "),
+        (("check", CLEAN, "--json", "--odd", "3", CLEAN), "sniff485: check: does not know --odd; "),
     ],
 )
 def test_it_is_one_line(words: tuple[object, ...], said: str, sniff485: Callable[..., Ran]) -> None:
@@ -30,3 +35,20 @@ def test_it_is_one_line(words: tuple[object, ...], said: str, sniff485: Callable
     assert (ran.code, ran.out) == (2, "")
     assert ran.err.startswith(said)
     assert len(ran.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("check", CLEAN, "--json", CLEAN), ("check", "--json", "--", CLEAN, CLEAN), ("check", CLEAN, CLEAN, "--json")],
+)
+def test_files_may_stand_on_both_sides_of_an_option(words: tuple[object, ...], sniff485: Callable[..., Ran]) -> None:
+    ran = sniff485(*words)
+    assert ran.err == ""
+    assert ran.out == sniff485("check", "--json", CLEAN, CLEAN).out
+
+
+@pytest.mark.parametrize(
+    "words", [("load", "--every", "2s", CLEAN), ("--every", "2s", CLEAN, "load"), (CLEAN, "load", "--every", "2000ms")]
+)
+def test_a_table_may_stand_before_and_after_its_files(words: tuple[object, ...], sniff485: Callable[..., Ran]) -> None:
+    assert sniff485("stats", *words).out == sniff485("stats", CLEAN, "--table", "load", "--every", "2s").out
