@@ -1,4 +1,4 @@
-"""Changes of the findings of a bus since the last look: appeared, became graver, is over. Pure."""
+"""Changes of the findings of a bus since the last look: appeared, became graver, is over or found no more. Pure."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
-from dissectors.findings import Finding, Severity
+from dissectors.findings import Finding, Severity, merged
 
 OVER_AFTER = 600_000_000_000
 """ns without another occurrence after which a finding is over."""
 
 
 class NewsKind(Enum):
-    """What happened to a finding."""
+    """What happened to a finding. Gone: it has not occurred for long, or is found no more: what was heard since speaks
+    against it, or another finding explains it."""
 
     NEW = "new"
     WORSE = "worse"
@@ -31,6 +32,7 @@ class News:
 
 @dataclass(slots=True)
 class _Known:
+    finding: Finding  # as it was found last
     severity: Severity
     is_over: bool = False
     told: int | None = None  # ns, when it was told last
@@ -52,22 +54,23 @@ class NewsDesk:
         return NewsDesk(self._least, self._every)
 
     def look(self, findings: Iterable[Finding], now: int) -> list[News]:
-        """What is to be told at `now` (ns on the capture's clock)."""
-        told = []
-        for finding in findings:
-            if finding.severity < self._least or finding.cause is not None:
-                continue  # a consequence is told with its cause
-            news = self._rationed(self._what(finding, now), finding, now)
-            if news is not None:
-                told.append(news)
-        return told
+        """What is to be told at `now` (ns on the capture's clock) of all that is found by then."""
+        told_with_causes = [one for one in findings if one.cause is None]
+        found = {one.key: one for one in merged([told_with_causes]) if one.severity >= self._least}
+        told = [self._rationed(self._what(one, now), one, now) for one in found.values()]
+        for key, known in self._known.items():
+            if key not in found:
+                was_over, known.is_over = known.is_over, True
+                told.append(self._rationed(None if was_over else NewsKind.GONE, known.finding, now))
+        return [news for news in told if news is not None]
 
     def _what(self, finding: Finding, now: int) -> NewsKind | None:
         known = self._known.get(finding.key)
         over = now - finding.last > OVER_AFTER
         if known is None:
-            self._known[finding.key] = _Known(finding.severity, over)
+            self._known[finding.key] = _Known(finding, finding.severity, over)
             return None if over else NewsKind.NEW
+        known.finding = finding
         was_over, known.is_over = known.is_over, over
         if over:
             return None if was_over else NewsKind.GONE

@@ -67,3 +67,21 @@ def test_what_is_over_is_told_when_its_time_comes() -> None:
     (news,) = desk.look([FOUND], 11 * S + OVER_AFTER)
     assert (news.what, news.held_back) == (NewsKind.GONE, 0)
     assert desk.look([FOUND], 12 * S + 2 * OVER_AFTER) == []
+
+
+def test_what_is_found_no_more_is_gone() -> None:
+    """Withdrawn, no longer worth a word, or another's consequence: nobody may believe that it still stands."""
+    for now in ([], [replace(FOUND, severity=Severity.NOTE)], [replace(FOUND, cause=("LN003", "bus"))]):
+        desk = NewsDesk(Severity.WARNING, 0)
+        desk.look([FOUND], 11 * S)
+        (news,) = desk.look(now, 12 * S)
+        assert (news.what, news.finding) == (NewsKind.GONE, FOUND)
+        assert desk.look(now, 13 * S) == []
+        assert [one.what for one in desk.look([FOUND], 14 * S)] == [NewsKind.NEW]
+
+
+def test_two_of_one_kind_about_one_station_are_one() -> None:
+    desk = NewsDesk(Severity.WARNING, 0)
+    old = replace(FOUND, first=0, last=S)
+    assert [one.what for one in desk.look([old, replace(FOUND, last=OVER_AFTER)], OVER_AFTER + 2 * S)] == [NewsKind.NEW]
+    assert desk.look([old, replace(FOUND, last=OVER_AFTER)], OVER_AFTER + 3 * S) == []
