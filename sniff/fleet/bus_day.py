@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, reduce
 
@@ -76,6 +76,21 @@ class BusDay:
         """How the bus and its stations fared. `findings`: this day's, where they are known already."""
         return health_of(self.summary, self.findings if findings is None else findings)
 
+    @property
+    def heard(self) -> Hashable:
+        """What only a copy has in common with it: when the first and the last octet came, to the ns, and how many."""
+        if self.day == NO_DATE or self.first is None:
+            return self.sources
+        return self.first, self.last, self.summary.octets, self.summary.frames
+
+    def and_copy(self, other: BusDay) -> BusDay:
+        """It or its copy, counted once; the order does not matter."""
+        low, high = sorted((self, other), key=lambda one: one.sources)
+        if low.sources == high.sources:
+            return low
+        note = f"{', '.join(low.sources)} and {', '.join(high.sources)} hold the same octets: counted once"
+        return replace(low, notes=tuple(sorted({*self.notes, *other.notes, note})))
+
     def merge(self, other: BusDay) -> BusDay:
         """Both together; the order does not matter. Raises ValueError for two buses or two days."""
         if self.key != other.key:
@@ -112,19 +127,18 @@ def empty_summary(line: str) -> Summary:
 
 @dataclass(slots=True)
 class Archive:
-    """All bus-days of an archive, merged; and what could not be read, path → why."""
+    """What all tasks of an archive gave; and what could not be read, path → why."""
 
-    days: dict[Key, BusDay] = field(default_factory=dict)
     unreadable: dict[str, str] = field(default_factory=dict)
+    _parts: dict[Key, dict[Hashable, BusDay]] = field(default_factory=dict)
 
     def add(self, day: BusDay) -> None:
-        """Take what a task gave."""
-        known = self.days.get(day.key)
-        self.days[day.key] = day if known is None else known.merge(day)
+        """Take what a task gave. A copy counts once: of a recording, with what was found in it, say."""
+        parts = self._parts.setdefault(day.key, {})
+        known = parts.get(day.heard)
+        parts[day.heard] = day if known is None else known.and_copy(day)
 
-    def merge(self, other: Archive) -> Archive:
-        """Both together, as a new value."""
-        whole = Archive(dict(self.days), {**self.unreadable, **other.unreadable})
-        for day in other.days.values():
-            whole.add(day)
-        return whole
+    @property
+    def days(self) -> dict[Key, BusDay]:
+        """All bus-days, merged."""
+        return {key: reduce(BusDay.merge, parts.values()) for key, parts in self._parts.items()}

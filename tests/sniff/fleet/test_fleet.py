@@ -83,14 +83,30 @@ def test_exactly_the_ill_buses_are_named_on_exactly_their_days(made: Made, days:
     assert {bus.bus for bus in found.buses if bus.troubles} == {plan.bus for plan in made[1] if plan.fault is not None}
 
 
-def test_the_answer_does_not_depend_on_order_or_on_how_parts_are_merged(days: list[BusDay]) -> None:
+def test_the_answer_does_not_depend_on_order(days: list[BusDay]) -> None:
     days = [*days, *(replace(day, day="2026-03-01") for day in days)]  # several captures a bus and day, some ill
     expected = values_of(answer(whole(days)))
     for seed in range(4):
         shuffled = random.Random(seed).sample(days, len(days))
         assert values_of(answer(whole(shuffled))) == expected
-        cut = len(days) * seed // 4
-        assert values_of(answer(whole(shuffled[:cut]).merge(whole(shuffled[cut:])))) == expected
+
+
+def test_a_copy_counts_once_and_is_named(days: list[BusDay]) -> None:
+    """A recording and the file in which what was found in it is kept."""
+    copies = [replace(day, sources=tuple(f"{path}-found" for path in day.sources)) for day in days]
+    once = answer(whole(days))
+    for given in ([*days, *copies], [*copies, *days]):
+        twice = answer(whole(given))
+        assert [(bus.days, bus.troubles) for bus in twice.buses] == [(bus.days, bus.troubles) for bus in once.buses]
+        notes = {note for bus in twice.buses for note in bus.notes}
+        assert sum("hold the same octets: counted once" in note for note in notes) == len(days)
+
+
+def test_two_recordings_in_which_nothing_was_heard_are_two() -> None:
+    silent = BusDay("", "b", "p", "modbus-rtu", "2026-03-01", "9600,8N1", empty_summary("9600,8N1"), sources=("a",))
+    archive = whole([silent, replace(silent, sources=("b",))])
+    (day,) = archive.days.values()
+    assert (day.sources, day.notes) == (("a", "b"), ())
 
 
 def test_what_the_index_keeps_is_what_was_read(days: list[BusDay]) -> None:
