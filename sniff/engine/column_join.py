@@ -14,7 +14,8 @@ import numpy as np
 from dissectors.columns import Times, TransactionColumns
 from dissectors.tracker import Transaction
 from sniff.engine.closings import Closings
-from sniff.engine.table import Table, joined_columns, transaction_columns
+from sniff.engine.row_packing import transaction_columns
+from sniff.engine.table import Table, joined_columns
 from sniff.engine.verdict_join import HELD, REMEMBERED, JudgedRow
 
 

@@ -13,7 +13,8 @@ from dissectors.manifest import Dissector
 from sniff.engine.engine import Row
 from sniff.engine.framing import Clean, Stretch
 from sniff.engine.late_columns import LateColumns
-from sniff.engine.table import Table, frame_columns, is_plain, joined_columns, transaction_columns
+from sniff.engine.row_packing import frame_columns, is_plain, transaction_columns
+from sniff.engine.table import Table, joined_columns
 
 
 @dataclass(frozen=True, slots=True)

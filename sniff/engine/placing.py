@@ -10,7 +10,8 @@ import numpy as np
 from dissectors.columns import NONE, PlacementColumns, Run, TransactionColumns
 from dissectors.tracker import Transaction
 from sniff.engine.engine import Row
-from sniff.engine.table import Table, joined_columns, placement_columns, rows_at, transaction_columns
+from sniff.engine.row_packing import placement_columns, transaction_columns
+from sniff.engine.table import Table, joined_columns, rows_at
 
 
 class Placing:

@@ -31,7 +31,8 @@ from dissectors.columns import (
 )
 from sniff.engine.engine import Row
 from sniff.engine.packed_table import PackedColumn, PackedParts
-from sniff.engine.table import PLACEMENT_FORMS, ROW_FORMS, TRANSACTION_FORMS, Table
+from sniff.engine.row_packing import PLACEMENT_FORMS, ROW_FORMS, TRANSACTION_FORMS
+from sniff.engine.table import Table
 from sniff.recording import odd_rows
 from sniff.recording.topics import SchemaText
 

@@ -18,7 +18,7 @@ from dissectors.n2.envelope import make_command
 from dissectors.n2.objects import attribute_name
 from dissectors.questions import Question, Span
 from sniff.engine.engine import Row
-from sniff.engine.table import frame_columns
+from sniff.engine.row_packing import frame_columns
 
 NAMES = [one.name for one in registry.usable() if one.questions is not None]
 

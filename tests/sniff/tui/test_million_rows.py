@@ -12,7 +12,8 @@ from dissectors.columns import CHECKS, FOUNDS, NONE, ROLES, FrameColumns, Placem
 from dissectors.frame import Check, FoundBy, Role
 from sniff.bus.rows import Store
 from sniff.engine.engine import Row
-from sniff.engine.table import Table, transaction_columns
+from sniff.engine.row_packing import transaction_columns
+from sniff.engine.table import Table
 from tests.sniff.tui.conftest import TOY
 
 MS = 1_000_000
