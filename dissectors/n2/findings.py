@@ -21,6 +21,7 @@ from dissectors.n2.envelope import check_off
 from dissectors.n2.header import meant
 from dissectors.n2.late import of_late_speakers
 from dissectors.n2.masters import HASTE, Masters, OpenCommand
+from dissectors.n2.misfits import asked_for
 from dissectors.n2.objects import region_name
 from dissectors.n2.record import Damages, N2StationRecord, Override
 from dissectors.n2.torn import TornFrames
@@ -33,6 +34,9 @@ __all__ = ["SLOW", "N2Findings"]
 
 ANSWERS_KEPT = 8
 """Answers remembered, to tell a repeat from a second one."""
+
+_IN_TURN = frozenset((Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION, Verdict.BROADCAST))
+"""Behind these no answer is overdue."""
 
 _NOT_JUDGED = frozenset((Verdict.ECHO, Verdict.OPEN, Verdict.DAMAGED_REQUEST, Verdict.BROADCAST))
 
@@ -64,6 +68,7 @@ class N2Findings:
         self._answers: OrderedDict[int, bytes] = OrderedDict()  # transaction → its good answer
         self._bad: int | None = None  # the newest damaged answer
         self.turn: int | None = None  # whom the newest command was for
+        self.is_overdue = False  # an answer may still come, to what closed last
         self._ignores: Callable[[int, str, str], bool] | None = None
 
     def know_unexecuted(self, ignores: Callable[[int, str, str], bool]) -> None:
@@ -142,6 +147,7 @@ class N2Findings:
         asked = self._asked.pop(transaction.id, None)
         code = self._codes.pop(transaction.id, "")
         verdict = transaction.verdict
+        was_overdue, self.is_overdue = self.is_overdue, verdict not in _IN_TURN
         if verdict is Verdict.UNSOLICITED:
             if transaction.response == self._bad:
                 self.late_speakers.noise(transaction.start, transaction.response)
@@ -168,6 +174,13 @@ class N2Findings:
             self.masters.see_late(transaction, station)
         elif asked is not None:
             self._settle_asked(station, asked, code, transaction)
+            if verdict in (Verdict.ANSWERED, Verdict.RETRY) and asked.frame.ok and not was_overdue:
+                self._see_fit(station, asked, transaction)
+
+    def _see_fit(self, station: N2StationRecord, asked: OpenCommand, transaction: Transaction) -> None:
+        read, answer = asked_for(asked.frame.octets), self._answers.get(transaction.id)
+        if read is not None and answer is not None:
+            station.misfits.see(read, len(answer), transaction.end, (transaction.request, transaction.response))
 
     def _settle_asked(self, station: N2StationRecord, asked: OpenCommand, code: str, transaction: Transaction) -> None:
         station.asked += 1

@@ -22,6 +22,7 @@ from dissectors.n2.commands import parse_command
 from dissectors.n2.findings import ANSWERS_KEPT, N2Findings, refusal_code
 from dissectors.n2.header import BROADCAST, meant
 from dissectors.n2.masters import HASTE, OpenCommand
+from dissectors.n2.misfits import FRAMED, READ, READ_LENGTH, asked_for
 from dissectors.n2.unheard import ONLY_LOOKS, SOON
 from dissectors.n2.wording import SLOW
 from dissectors.rhythm import TURNS_KEPT
@@ -119,6 +120,9 @@ class _Judging:
         kinds = [at for at, name in enumerate(names) if name in _REMEMBERED]
         told = found.refused | (found.answered & np.isin(found.kind, kinds))
         slow = found.answered & (self._closed.least > SLOW)
+        length = rows.frames.length[found.stretches.request]
+        is_read = found.answered & ~found.refused & (length == READ_LENGTH)
+        self._reads = is_read & (found.kind == names.index(READ)) if READ in names else np.zeros(len(is_read), bool)
         self._unheard = np.zeros(len(found.answered), bool)
         self._events = told | slow | ~(found.answered | found.to_all)
 
@@ -140,6 +144,7 @@ class _Judging:
         for at in (begin + np.flatnonzero(self._events[which])).tolist():
             self._see_event(at)
         self._see_late(begin, end)
+        self._see_fits(begin, end)
         judge.newest = int(frames.start[stretch.stop - 1])
         self._see_rhythm(begin, end)
         self._keep_answers(begin, end)
@@ -225,6 +230,35 @@ class _Judging:
             judge.refused(station, asked, refusal_code(self._octets(place + 1)), transaction)
         else:
             judge.obeyed(station, asked, transaction)
+
+    def _see_fits(self, begin: int, end: int) -> None:
+        """Acknowledges of reads, by what was asked; one by one only those that do not fit."""
+        judge, found, frames = self._judge, self.found, self._rows.frames
+        in_turn = found.answered[begin:end] | found.to_all[begin:end]
+        reads = np.append(not judge.is_overdue, in_turn[:-1]) & self._reads[begin:end]
+        judge.is_overdue = not in_turn[-1]
+        at = begin + np.flatnonzero(reads)
+        request, last = found.stretches.request[at], found.stretches.last[at]
+        octets, offset = self._rows.octets, frames.offset[request].astype(np.int64)
+        region, high, low = (octets[offset + place].astype(np.int64) for place in (4, 7, 8))
+        key = found.unit[at] << 24 | region << 16 | high << 8 | low
+        _, first, which = np.unique(key, return_index=True, return_inverse=True)
+        told = [asked_for(self._octets(int(request[one]))) for one in first.tolist()]
+        odd = np.zeros(len(at), bool)
+        for number, asked in enumerate(told):
+            if asked is not None:
+                same = which == number
+                fits = same & np.isin(frames.length[last], [width + FRAMED for width in asked.widths])
+                judge.station(int(found.unit[at[first[number]]])).misfits.see_fitting(
+                    asked, int(np.count_nonzero(fits))
+                )
+                odd |= same & ~fits
+        for one in np.flatnonzero(odd).tolist():
+            asked, place = told[int(which[one])], int(at[one])
+            assert asked is not None
+            nos = self._rows.first + int(request[one]), self._rows.first + int(last[one])
+            misfits = judge.station(int(found.unit[place])).misfits
+            misfits.see(asked, int(frames.length[last[one]]), int(self._closed.end[place]), nos)
 
     def _keep_answers(self, begin: int, end: int) -> None:
         found = self.found

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from dissectors.findings import Tally
 from dissectors.frame import Flaw
+from dissectors.n2.misfits import Misfits
 
 _RECALLED = 16  # unanswered commands that a late answer may still answer
 
@@ -126,4 +127,5 @@ class N2StationRecord:
     late: Tally = field(default_factory=Tally)
     points: dict[tuple[int, int, int | None], Tally] = field(default_factory=dict)
     refused: dict[tuple[str, str], Tally] = field(default_factory=dict)
+    misfits: Misfits = field(default_factory=Misfits)
     overrides: dict[tuple[int, int], Override] = field(default_factory=dict)

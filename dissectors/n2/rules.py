@@ -81,7 +81,7 @@ RULES: dict[str, Rule] = {
             "master does that. At least two such.",
             "two masters on one bus, or a commissioning tool beside the controller",
             "find the second master and take it off",
-            explains=("N2004", "N2005", "N2008", "N2010", "N2011", "N2013", "N2014", "N2015", "LN1", "LN2"),
+            explains=("N2004", "N2005", "N2008", "N2010", "N2011", "N2013", "N2014", "N2015", "N2016", "LN1", "LN2"),
         ),
         Rule(
             "N2008",
@@ -91,7 +91,7 @@ RULES: dict[str, Rule] = {
             "missed at this tap would let one come. A single time it is only noted.",
             "two stations have the same address",
             "switch the station off and see whether something still answers",
-            explains=("N2004", "N2011", "N2013", "N2014", "LN101", "LN103", "LN2"),
+            explains=("N2004", "N2011", "N2013", "N2014", "N2016", "LN101", "LN103", "LN2"),
         ),
         Rule(
             "N2009",
@@ -172,6 +172,17 @@ RULES: dict[str, Rule] = {
             "no station is to blame",
             "move the tap towards the stations that are not heard; where none is, listen on the other pair",
             explains=("N2005",),
+        ),
+        Rule(
+            "N2016",
+            Severity.WARNING,
+            "answers without what was asked for",
+            "A station acknowledges reads of attributes whose length is known, and gives no value or one of another "
+            "length: at least three times, and 1 in 10 of its reads. Not behind a command that nothing followed, "
+            "whose late answer it may be. What it always gives at a length of its own is only noted.",
+            "a fault in the program of the device, or a master and a station that are out of step, so that one "
+            "takes the answer to another command",
+            "what the master shows for these points; the device's list of points",
         ),
     )
 }

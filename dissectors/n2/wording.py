@@ -11,7 +11,7 @@ from dissectors.frame import Flaw
 from dissectors.line import MS, NS_PER_S
 from dissectors.n2.blame import blamed
 from dissectors.n2.commands import error_name
-from dissectors.n2.objects import attribute_name, number, object_name
+from dissectors.n2.objects import REGIONS, attribute_name, number, object_name
 from dissectors.n2.record import Damages, N2StationRecord
 from dissectors.n2.rules import RULES
 from dissectors.n2.unheard import SOON
@@ -247,6 +247,7 @@ def _of_station(heard: N2Evidence, name: str, station: N2StationRecord, is_told:
         yield _slow(heard, name, station)
     if heard.missing(station).count and not is_told:
         yield _missing(heard, name, station)
+    yield from _misfits(heard, name, station)
     yield from _overrides(heard, name, station)
     yield from _again(heard, name, station)
     refused = sum(tally.count for tally in station.refused.values())
@@ -257,6 +258,28 @@ def _of_station(heard: N2Evidence, name: str, station: N2StationRecord, is_told:
         yield tally.found(RULES["N2009"], name, seen, Severity.WARNING if is_all else None)
     if station.again.count:
         yield station.again.found(RULES["N2010"], name, f"identified again {times(station.again.count)}")
+
+
+MISFITS_LEAST = 3
+"""So many acknowledges without what was asked for, and 1 in 10 of all, are no late answer to something else."""
+
+
+def _misfits(heard: N2Evidence, name: str, station: N2StationRecord) -> Iterator[Finding]:
+    """Acknowledges that do not hold what was asked for. What a station always gives at a length of its own is its way
+    of writing it."""
+    misfits = station.misfits
+    mixed = together(tally for attribute, tally in misfits.odd.items() if attribute in misfits.fitting)
+    bad = together((misfits.empty, mixed))
+    if bad.count >= MISFITS_LEAST and 10 * bad.count >= misfits.reads:
+        parts = [f"{misfits.empty.count} without a value"] if misfits.empty.count else []
+        parts += [f"{mixed.count} of another length than else"] if mixed.count else []
+        seen = f"{' and '.join(parts)} among {counted(misfits.reads, 'acknowledged read')}"
+        yield bad.found(RULES["N2016"], name, seen)
+    for (region, attribute), tally in sorted(misfits.odd.items()):
+        if (region, attribute) not in misfits.fitting and tally.count >= MISFITS_LEAST:
+            what = f"{REGIONS[region].title}: {attribute_name(region, attribute)}"
+            seen = f"{what} always has another length than is known of it"
+            yield tally.found(RULES["N2016"], name, seen, Severity.NOTE)
 
 
 REFUSED_LEAST = 5

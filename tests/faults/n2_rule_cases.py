@@ -87,6 +87,11 @@ def _nothing(octets: bytes) -> bytes:
     return b""
 
 
+def _empty(octets: bytes) -> bytes:
+    """An acknowledge without the value."""
+    return b"A\r" if octets[:1] == b"A" else octets
+
+
 _INNOCENT = ("N2007", "N2008")
 _DRIVE = (("N2012", "station 2"),)
 
@@ -126,6 +131,13 @@ N2_RULE_CASES: tuple[Case, ...] = (
         hear=partial(_edited, _nothing, ("drive 1", "drive 2")),
         never=("N2005", *_INNOCENT),
         seeds=1,
+    ),
+    Case(
+        "N2 reads acknowledged without a value",
+        partial(n2, pause=150 * MS),
+        (("N2016", "station 2"),),
+        hear=partial(_edited, _empty, ("drive 2",)),
+        never=_INNOCENT,
     ),
     Case("N2 bit errors everywhere", partial(n2, (BitFlips(4e-3),)), (("N2004", "bus"),), never=_INNOCENT),
     Case(

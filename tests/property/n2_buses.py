@@ -28,6 +28,7 @@ TROUBLES = (
     "late",  # after the next command
     "unasked",
     "slow",
+    "misfit",  # an acknowledge that does not hold what was asked for
     "master",  # a second one breaks in
     "cut",  # a command that another one runs into
 )
@@ -98,6 +99,7 @@ def _turn(
         "late": [(said, gap), (other, timeout), (answer, took), (make_answer("42480000"), took)],
         "unasked": [(answer, gap)],
         "slow": [(said, gap), (answer, timeout - dice.randint(1, 100) * _MS)],
+        "misfit": [(said, gap), (dice.choice((b"A\r", make_answer("42"), make_answer("0042480000"))), took)],
         "master": [(said, gap), (other, took // 8), (answer, took)],
         "cut": [(said[:at] + other, gap), (answer, took)],
     }
