@@ -116,7 +116,7 @@ class _Desk:
         says, its octets (`hex`), and how its exchange went (`verdict`, `latency_ms`)."""
         wanted = filter if not after else f"frame.number > {after}" + (f" && ({filter})" if filter else "")
         where = [f"-Y{wanted}"] if wanted else []
-        said = await self._ask("show", capture, bus, "--json", f"--count={limit}", *where, *_devices(devices))
+        said = await self._ask_one("show", capture, bus, "--json", f"--count={limit}", *where, *_devices(devices))
         rows = bounded([_row(one) for one in said.objects()])
         more = len(rows) == limit or len(rows) < len(said.lines) or not said.whole
         return marked(rows, f"ask again with after={rows[-1]['no']}" if rows and more else "")
@@ -130,7 +130,7 @@ class _Desk:
     ) -> str:
         """One frame in full: the tree of its fields and its octets."""
         where = f"-Yframe.number == {number}"
-        said = await self._ask("show", capture, bus, "-V", "-x", "--count=1", where, *_devices(devices))
+        said = await self._ask_one("show", capture, bus, "-V", "-x", "--count=1", where, *_devices(devices))
         if not said.lines:
             raise ToolError(f"there is no frame {number}")
         return answer(said.lines)
@@ -153,7 +153,7 @@ class _Desk:
         good, 1 doubtful, 2 out of range), how often it came and what it ranged over. Names need device profiles; where
         none is known the values are by register, with a guess of their type."""
         only = [f"--name={name}"] if name else []
-        said = await self._ask("points", capture, bus, "--latest", "--json", *only, *_devices(devices))
+        said = await self._ask_one("points", capture, bus, "--latest", "--json", *only, *_devices(devices))
         return answer(said.objects(), "" if said.whole else "more; ask for names")
 
     async def polls(self, capture: Capture = "", bus: Bus = "") -> str:
@@ -170,6 +170,10 @@ class _Desk:
         """Names for filters, with their types and words."""
         said = await self._run("show", f"--help-fields={protocol}", "-")
         return _own("fields", [line for line in said.lines if like.lower() in line.lower()])
+
+    async def _ask_one(self, command: str, capture: str, bus: str, *options: str) -> Said:
+        """Of one bus: rows and values of several have numbers and names in common."""
+        return await self._ask(command, capture, bus, *options, *([] if bus else ["--bus="]))
 
     async def _ask(self, command: str, capture: str, bus: str, *options: str) -> Said:
         try:

@@ -79,9 +79,12 @@ def since_start(time: int, session: Session) -> int:
     return max(0, time - session.started)
 
 
-def json_line(item: JudgedRow, dissector: Dissector, session: Session, with_fields: bool = False) -> str:
-    """The object on one line."""
-    return dumps(to_json(item, dissector, session, with_fields))
+def json_line(
+    item: JudgedRow, dissector: Dissector, session: Session, with_fields: bool = False, source: str | None = None
+) -> str:
+    """The object on one line; it begins with its source where there is one."""
+    told = to_json(item, dissector, session, with_fields)
+    return dumps(told if source is None else {"source": source, **told})
 
 
 def typed(item: JudgedRow, dissector: Dissector, session: Session) -> list[Any]:

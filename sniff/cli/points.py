@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import fnmatch
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from dissectors.line import MS, NS_PER_S
@@ -19,6 +19,7 @@ from dissectors.profiles import Devices
 from dissectors.profiles.decoding import Quality, number
 from sniff.analysis.point_reader import PointReader, Sample
 from sniff.analysis.points import Point, PointTable
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.offline import outputs
 from sniff.bus.row_words import iso
 from sniff.bus.sample_row import COLUMNS, sample_row, shown_value
@@ -31,6 +32,7 @@ from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent, Session
+from sniff.formats.parquet import Kind
 
 if TYPE_CHECKING:
     from sniff.analysis.guessed_points import GuessedPoint, Guessing
@@ -97,26 +99,40 @@ def run(args: argparse.Namespace) -> int:
         return _print(args)
     if args.latest:
         raise Failure("--parquet holds every sample: leave --latest out", USAGE)
-    with writing.parquet_file(args, COLUMNS) as table:
+    opened = arguments.open_captures(args.files)
+    columns = {"source": Kind.TEXT, **COLUMNS} if len(opened) > 1 else COLUMNS
+    with writing.parquet_file(args, columns) as table:
         assert table is not None
-        for name, capture in arguments.open_captures(args.files):
+        for name, capture in opened:
+            first = [name] if len(opened) > 1 else []
             session = arguments.settings_of(args, capture.session, name)
             for samples in _chosen(args, capture, session):
                 for sample in samples.in_order():
-                    table.add(sample_row(sample))
+                    table.add([*first, *sample_row(sample)])
             say_incomplete(name, capture)
     return 0
 
 
 def _print(args: argparse.Namespace) -> int:
-    for path, capture in arguments.open_captures(args.files):
+    opened = arguments.open_captures(args.files)
+    latest = args.latest if args.latest is not None else args.style == "text"
+    headings = LATEST if latest else SAMPLES
+    first = ("source",) if len(opened) > 1 else ()  # of several captures each row says of which it is
+    growing = tables.Growing((*first, *headings), args.style) if args.style != "text" else None
+    for at, (path, capture) in enumerate(opened):
         session = arguments.settings_of(args, capture.session, path)
-        latest = args.latest if args.latest is not None else args.style == "text"
+        if first and growing is None:
+            print(f"\n{sanitized(path)}" if at else sanitized(path))
         if latest:
-            _print_latest(args, capture, session)
+            cells: Iterable[tuple[Cell, ...]] = _latest_of(args, capture, session)
         else:
-            chosen = (cells for samples in _chosen(args, capture, session) for cells in _cells(samples))
-            tables.write(SAMPLES, chosen, args.style)
+            cells = (cells for samples in _chosen(args, capture, session) for cells in _cells(samples))
+        if growing is not None:
+            growing.add((path, *row) for row in cells) if first else growing.add(cells)
+        elif latest:
+            _write_latest(list(cells))
+        else:
+            tables.write(SAMPLES, cells)
         say_incomplete(path, capture)
     return 0
 
@@ -172,7 +188,8 @@ def _wanted(args: argparse.Namespace, samples: TableSamples) -> TableSamples:
     return samples.named(lambda point: any(fnmatch.fnmatchcase(point, name) for name in args.name))
 
 
-def _print_latest(args: argparse.Namespace, capture: Capture, session: Session) -> None:
+def _latest_of(args: argparse.Namespace, capture: Capture, session: Session) -> list[tuple[Cell, ...]]:
+    """The newest of each point of a capture."""
     from sniff.analysis.guessed_points import Guessing
     from sniff.analysis.point_columns import add_to
 
@@ -185,10 +202,12 @@ def _print_latest(args: argparse.Namespace, capture: Capture, session: Session) 
         samples = _wanted(args, samples)
         add_to(points, samples)
         end = max(end, samples.last or 0)
-    _show_latest(args, points, guessing, end)
+    return _latest_rows(args, points, guessing, end)
 
 
-def _show_latest(args: argparse.Namespace, points: PointTable, guessing: Guessing | None, end: int) -> None:
+def _latest_rows(
+    args: argparse.Namespace, points: PointTable, guessing: Guessing | None, end: int
+) -> list[tuple[Cell, ...]]:
     """The table as it is at `end`, ns."""
     shown = [point for point in points if args.bits or args.name or not point.sample.value.bit]
     told = guessing.of(points) if guessing is not None else {}
@@ -197,9 +216,11 @@ def _show_latest(args: argparse.Namespace, points: PointTable, guessing: Guessin
         guess = told.get((point.sample.station, point.sample.name))
         if guess is None or not guess.is_covered:
             rows.append(_latest(point, end, args.style, guess))
-    if args.style != "text":
-        tables.write(LATEST, rows, args.style)
-        return
+    return rows
+
+
+def _write_latest(rows: Sequence[tuple[Cell, ...]]) -> None:
+    """For people: without columns in which nothing stands."""
     kept = [at for at, name in enumerate(LATEST) if name not in _SELDOM or any(row[at] for row in rows)]
     changed = LATEST.index("changed s")
     fresh = [_is_fresh(row[changed]) for row in rows] if arguments.colour() else ()
@@ -217,7 +238,11 @@ def _listen(args: argparse.Namespace, port: str) -> int:
         return watching.follow(live, values, None)
 
     def show() -> None:
-        _show_latest(args, values.points, values.guessing, values.now)
+        told = _latest_rows(args, values.points, values.guessing, values.now)
+        if args.style == "text":
+            _write_latest(told)
+        else:
+            tables.write(LATEST, told, args.style)
 
     return watching.follow(live, values, show, args.style)
 

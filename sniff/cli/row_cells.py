@@ -57,8 +57,9 @@ class Style:
     quote: bytes = b""
 
 
-def separated(count: int, delimiter: str) -> Style:
-    """`count` values with something between them, quoted where need be; no cell is a formula."""
+def separated(count: int, delimiter: str, first: Sequence[str] = ()) -> Style:
+    """`count` values with something between them, quoted where need be; no cell is a formula. `first`: what every line
+    begins with."""
     held = io.StringIO()
     writer = csv.writer(held, delimiter=delimiter, lineterminator="\n")
     more = [] if count == 1 else ["x"]
@@ -69,12 +70,14 @@ def separated(count: int, delimiter: str) -> Style:
         writer.writerow([plain_cell(value), *more])
         return encoded(held.getvalue()[: -1 - 2 * len(more)])
 
-    return Style(render, (b"", *[delimiter.encode()] * (count - 1)), b"\n")
+    between = delimiter.encode()
+    return Style(render, (b"".join(render(text) + between for text in first), *[between] * (count - 1)), b"\n")
 
 
-def json_lines(names: Sequence[str]) -> Style:
-    """An object a line."""
-    before = (f'{", " if at else "{"}"{name}": '.encode() for at, name in enumerate(names))
+def json_lines(names: Sequence[str], source: str | None = None) -> Style:
+    """An object a line, which begins with its source where there is one."""
+    begin = "{" if source is None else f'{{"source": {json_output.dumps(source)}, '
+    before = (f'{", " if at else begin}"{name}": '.encode() for at, name in enumerate(names))
     return Style(lambda value: encoded(json_output.dumps(value)), tuple(before), b"}\n", b'"')
 
 

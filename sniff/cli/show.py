@@ -7,11 +7,12 @@ from __future__ import annotations
 import argparse
 import csv
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus import row_words as rows
 from sniff.bus.offline import settled_columns
 from sniff.bus.second_proof import SecondProof
@@ -24,7 +25,7 @@ from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 from sniff.engine.verdict_join import JudgedRow
-from sniff.formats.parquet import ParquetWriter
+from sniff.formats.parquet import Kind, ParquetWriter
 
 if TYPE_CHECKING:
     from dissectors.columns import Times
@@ -41,7 +42,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_devices(parser)
     arguments.add_reference(parser)
     style = parser.add_mutually_exclusive_group()
-    style.add_argument("--json", action="store_true", help="one JSON object a frame")
+    style.add_argument("--json", action="store_true", help="one JSON object a frame; of several captures with its source")
     style.add_argument("--csv", action="store_true", help="comma-separated values, the columns of --json")
     style.add_argument("--parquet", metavar="OUT", help="the same into a Parquet file: instants, numbers and texts")
     parser.add_argument("-f", "--force", action="store_true", help="overwrite OUT")
@@ -68,15 +69,22 @@ def run(args: argparse.Namespace) -> int:
         from sniff.cli.field_names import check_names
 
         check_names(args.names)
-    with writing.parquet_file(args, rows.COLUMNS) as table:
-        return _show_all(args, table)
+    opened = arguments.open_captures(args.files)
+    columns = {"source": Kind.TEXT, **rows.COLUMNS} if len(opened) > 1 else rows.COLUMNS
+    with writing.parquet_file(args, columns) as table:
+        return _show_all(args, opened, table)
 
 
-def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
+def _show_all(args: argparse.Namespace, opened: Sequence[tuple[str, Capture]], table: ParquetWriter | None) -> int:
+    are_several = len(opened) > 1
     if args.csv:
-        csv.writer(sys.stdout, lineterminator="\n").writerow(rows.JSON_KEYS)
+        names = ("source", *rows.JSON_KEYS) if are_several else rows.JSON_KEYS
+        csv.writer(sys.stdout, lineterminator="\n").writerow(names)
     left = args.count
-    for path, capture in arguments.open_captures(args.files):
+    for at, (path, capture) in enumerate(opened):
+        source = path if are_several else None  # of several captures each row says of which it is
+        if source is not None and _is_text(args):
+            print(f"\n{sanitized(source)}" if at else sanitized(source))
         session = arguments.settings_of(args, capture.session, path)
         devices = arguments.noted_devices(args, session)
         proof, wanted = filtering.filter_of_both(args, capture, session, devices)
@@ -90,15 +98,20 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
         ours = _cells_of_filters(args.names, session, devices)
         listed = ListedRows(args, capture, session, proof, wanted, *(() if ours is None else (ours.noting,)))
         if args.reference or spoken or named or ours or args.hex or proof.name:
-            left = _show(args, listed.all(spoken), session, ours, left, table)
+            left = _show(args, listed.all(spoken), session, ours, left, table, source)
         else:
-            left = _show_in_bulk(args, capture, session, proof, wanted, left, table)
+            left = _show_in_bulk(args, capture, session, proof, wanted, left, table, source)
             if proof.name and left != 0:
-                left = _show(args, listed.of_both(spoken), session, ours, left, table)
+                left = _show(args, listed.of_both(spoken), session, ours, left, table, source)
         say_incomplete(path, capture)
         if left == 0:
             break
     return 0
+
+
+def _is_text(args: argparse.Namespace) -> bool:
+    """Whether rows are printed as lines for people."""
+    return not (args.json or args.csv or args.table or args.parquet or args.explain)
 
 
 def _cells_of_filters(names: list[str], session: Session, devices: Devices) -> FieldCells | None:
@@ -127,20 +140,23 @@ def _show(
     ours: FieldCells | None,
     left: int | None,
     table: ParquetWriter | None,
+    source: str | None,
 ) -> int | None:
     colour = arguments.colour()
     usual = dissector_for(session)
+    first = () if source is None else (source,)
     writer = csv.writer(sys.stdout, delimiter="," if args.csv else "\t", lineterminator="\n", quoting=csv.QUOTE_MINIMAL)
     for item, dissector in items if left != 0 else ():
         left = None if left is None else left - 1
         if table is not None:
-            table.add(rows.typed(item, dissector, session))
+            table.add([*first, *rows.typed(item, dissector, session)])
         elif args.csv:
-            writer.writerow([plain_cell(value) for value in rows.to_json(item, dissector, session).values()])
+            values = rows.to_json(item, dissector, session).values()
+            writer.writerow([plain_cell(value) for value in (*first, *values)])
         elif args.table:
             writer.writerow(_cells(item, args.names, dissector, session, ours))
         elif args.json:
-            print(rows.json_line(item, dissector, session, args.fields))
+            print(rows.json_line(item, dissector, session, args.fields, source))
         else:
             title = dissector.title if dissector is not usual else ""
             print(rows.text_line(item, dissector, session, colour, title))
@@ -161,9 +177,10 @@ def _show_in_bulk(
     wanted: Filter | None,
     left: int | None,
     table: ParquetWriter | None,
+    source: str | None,
 ) -> int | None:
     """The rows before the first that may be one of a second protocol."""
-    listed = _listed(args, dissector_for(session), session, table)
+    listed = _listed(args, dissector_for(session), session, table, source)
     for settled_rows in settled_columns(Watched(capture, prints=True), session, proof) if left != 0 else ():
         places, first = _chosen(settled_rows, wanted), settled_rows.table.first
         if proof.name:
@@ -189,9 +206,14 @@ def _chosen(some: SettledRows, wanted: Filter | None) -> Times:
 
 
 def _listed(
-    args: argparse.Namespace, dissector: Dissector, session: Session, table: ParquetWriter | None
+    args: argparse.Namespace,
+    dissector: Dissector,
+    session: Session,
+    table: ParquetWriter | None,
+    source: str | None,
 ) -> Callable[[SettledRows, Times], None]:
     """What lists rows at some places."""
+    first = () if source is None else (source,)
     if table is not None:
         from sniff.cli.row_columns import RowColumns
 
@@ -199,7 +221,7 @@ def _listed(
 
         def added(some: SettledRows, places: Times) -> None:
             for cells in columns.cells(some, places.tolist(), rows.JSON_KEYS, lambda cell: cell, instants=True):
-                table.add(cells)
+                table.add([*first, *cells])
 
         return added
     made: RowCells | RowLines
@@ -207,11 +229,11 @@ def _listed(
         from sniff.cli.row_cells import RowCells, json_lines, separated
 
         if args.csv:
-            made = RowCells(dissector, session, rows.JSON_KEYS, separated(len(rows.JSON_KEYS), ","))
+            made = RowCells(dissector, session, rows.JSON_KEYS, separated(len(rows.JSON_KEYS), ",", first))
         elif args.table:
             made = RowCells(dissector, session, args.names, separated(len(args.names), "\t"))
         else:
-            made = RowCells(dissector, session, rows.JSON_KEYS, json_lines(rows.JSON_KEYS))
+            made = RowCells(dissector, session, rows.JSON_KEYS, json_lines(rows.JSON_KEYS, source))
     else:
         from sniff.cli.row_lines import RowLines
 

@@ -64,7 +64,7 @@ class SeveralBuses:
 
 @contextlib.contextmanager
 def chosen(name: str | None) -> Iterator[None]:
-    """Meanwhile only the bus of this name is read of a file that has several; None: all."""
+    """Meanwhile only the bus of this name is read of a file that has several; None: all; "": the only one there is."""
     token = _CHOSEN.set(name)
     try:
         yield
@@ -79,7 +79,9 @@ def buses_in(capture: Capture, path: Path | str | None = None) -> list[Capture]:
     found = list(capture.buses) if isinstance(capture, SeveralBuses) else [capture]
     if name is None or (found == [capture] and name == capture.session.bus):
         return found
-    wanted = [one for one in found if one.session.bus == name]
+    if not name and isinstance(capture, SeveralBuses):
+        raise CaptureError(capture.refusal)
+    wanted = [one for one in found if one.session.bus == name] if name else found
     if wanted:
         return wanted
     if isinstance(capture, SeveralBuses):

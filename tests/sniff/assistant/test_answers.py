@@ -67,7 +67,7 @@ def test_what_comes_from_the_wire_is_marked_as_data() -> None:
 def test_a_filter_is_one_argument_whatever_it_holds() -> None:
     for wanted in ("--parquet=/tmp/x", "-o /tmp/x", "dst == 3; rm -rf /"):
         _, asked = call([], "frames", filter=wanted)
-        assert asked == [["show", "--json", "--count=50", f"-Y{wanted}", "/data/night.mcap"]]
+        assert asked == [["show", "--json", "--count=50", f"-Y{wanted}", "--bus=", "/data/night.mcap"]]
 
 
 def test_frames_go_on_behind_the_last() -> None:

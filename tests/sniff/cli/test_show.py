@@ -189,7 +189,8 @@ def test_csv_has_the_values_of_json(poll: Path, sniff485: Callable) -> None:
 
 def test_csv_has_one_heading_and_takes_filters(poll: Path, sniff485: Callable) -> None:
     out = sniff485("show", "--csv", poll, poll, "-Y", "verdict == no-response").out
-    assert [line.split(",")[0] for line in out.splitlines()] == ["no", "4", "4"]
+    assert [line.split(",")[0] for line in out.splitlines()] == ["source", str(poll), str(poll)]
+    assert [line.split(",")[1] for line in out.splitlines()] == ["no", "4", "4"]
 
 
 def test_no_cell_of_csv_is_a_formula(poll: Path, sniff485: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
