@@ -198,6 +198,14 @@ def rotation(text: str) -> str:
     return text
 
 
+def add_recording(parser: argparse.ArgumentParser, what: str) -> None:
+    """-w, and -o as where a capture is written from another one."""
+    parser.add_argument("-w", "--write", metavar="FILE", help=what)
+    parser.add_argument(
+        "-o", "--output", dest="write", metavar="FILE", default=argparse.SUPPRESS, help=argparse.SUPPRESS
+    )
+
+
 def open_capture(path: str) -> Capture:
     """Open a capture of one bus, or end with exit code 3 (2 for an unknown suffix, and where --bus must choose)."""
     capture = _opened(path)

@@ -23,7 +23,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_devices(parser)
     parser.add_argument("--seed", type=int, default=485, metavar="N", help="which faults strike when (default 485)")
     parser.add_argument("--clean", action="store_true", help="no faults on the line; who is absent stays so")
-    parser.add_argument("-w", "--write", metavar="FILE", help="record to FILE (.mcap)")
+    arguments.add_recording(parser, "record to FILE (.mcap)")
     parser.add_argument(
         "--duration", type=arguments.duration, metavar="TIME", help="stop after (default without a terminal: 10 s)"
     )

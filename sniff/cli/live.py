@@ -30,7 +30,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     arguments.add_line(parser, auto=True)
     arguments.add_devices(parser)
-    parser.add_argument("-w", "--write", metavar="FILE", help="recording (.mcap); default: a new name in this folder")
+    arguments.add_recording(parser, "recording (.mcap); default: a new name in this folder")
     parser.add_argument("--no-record", action="store_true", help="do not record")
     parser.add_argument("--duration", type=arguments.duration, metavar="TIME", help="stop after: 90, 90s, 5m, 2h")
     parser.add_argument(

@@ -20,7 +20,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--all", action="store_true", help="every bus of the configuration that has a port")
     arguments.add_line(parser, auto=True)
     arguments.add_devices(parser)
-    parser.add_argument("-w", "--write", metavar="FILE", help="recording (.mcap); default: a new name in this folder")
+    arguments.add_recording(parser, "recording (.mcap); default: a new name in this folder")
     parser.add_argument("--duration", type=arguments.duration, metavar="TIME", help="stop after: 90, 90s, 5m, 2h")
     parser.add_argument("--count", type=arguments.positive, metavar="N", help="stop after N frames")
     parser.add_argument(

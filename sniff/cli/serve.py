@@ -38,7 +38,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("source", metavar="FILE|PORT|BUS", help="a capture, a port, or a configured bus")
     arguments.add_line(parser)
     arguments.add_devices(parser)
-    parser.add_argument("-w", "--write", metavar="FILE", help="a port: recording (.mcap); default: a new name here")
+    arguments.add_recording(parser, "a port: recording (.mcap); default: a new name here")
     parser.add_argument(
         "--host", default="127.0.0.1", metavar="ADDRESS", help="address to serve at (default 127.0.0.1)"
     )

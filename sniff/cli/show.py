@@ -42,7 +42,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_devices(parser)
     arguments.add_reference(parser)
     style = parser.add_mutually_exclusive_group()
-    style.add_argument("--json", action="store_true", help="one JSON object a frame; of several captures with its source")
+    style.add_argument("--json", action="store_true", help="one JSON object a frame; of several captures: whose it is")
     style.add_argument("--csv", action="store_true", help="comma-separated values, the columns of --json")
     style.add_argument("--parquet", metavar="OUT", help="the same into a Parquet file: instants, numbers and texts")
     parser.add_argument("-f", "--force", action="store_true", help="overwrite OUT")

@@ -52,3 +52,12 @@ def test_files_may_stand_on_both_sides_of_an_option(words: tuple[object, ...], s
 )
 def test_a_table_may_stand_before_and_after_its_files(words: tuple[object, ...], sniff485: Callable[..., Ran]) -> None:
     assert sniff485("stats", *words).out == sniff485("stats", CLEAN, "--table", "load", "--every", "2s").out
+
+
+@pytest.mark.parametrize("option", ["-w", "--write", "-o", "--output"])
+def test_a_recording_is_named_as_any_other_file_that_is_written(
+    option: str, sniff485: Callable[..., Ran], tmp_path: Path
+) -> None:
+    ran = sniff485("record", "/dev/null", "-s", "9600,8N1", "-p", "n2", option, tmp_path / "x.txt")
+    assert ".mcap" in ran.err
+    assert ran.code == 2
