@@ -111,6 +111,9 @@ class Prompt(Vertical):
             self.purpose = purpose
             self.text = text
 
+    class Heard(Message):
+        """Comes after `Answered`, when the screen has done what was asked for."""
+
     class Closed(Message):
         """The prompt was left."""
 
@@ -213,11 +216,11 @@ class Prompt(Vertical):
             return
         self._is_answered = True
         self.post_message(self.Answered(self.purpose, text))
-        self.call_after_refresh(self._close_answered)  # closing lays out the whole screen: what was asked for first
+        self.post_message(self.Heard())
 
     def hand_on(self, key: Key) -> None:
         """Give a key to the screen, which has its keys again before it."""
-        self._close_answered()
+        self.close_answered()
         self.post_message(self.KeyBehind(key.key, key.character))
 
     def action_cancel(self) -> None:
@@ -228,7 +231,7 @@ class Prompt(Vertical):
         """Take the completion shown."""
         self.query_one(Input).action_cursor_right()
 
-    def _close_answered(self) -> None:
+    def close_answered(self) -> None:
         """Close, unless it is closed, or open again and asks for something else."""
         if self.is_open and self._is_answered:
             self._close()

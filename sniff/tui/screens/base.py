@@ -95,6 +95,10 @@ class ViewScreen(Screen[None]):
         """What has the keys when the prompt is left."""
         return self.query_one(self.AUTO_FOCUS, Widget)
 
+    def on_prompt_heard(self) -> None:
+        """Closing lays out the whole screen: what was asked for is painted first."""
+        self.call_after_refresh(self.query_one(Prompt).close_answered)
+
     def on_prompt_closed(self) -> None:
         """Back to where the keys were, unless the prompt asks again; at once, for a key may follow."""
         if not self.query_one(Prompt).is_open:
