@@ -30,6 +30,7 @@ from sniff.engine.session import Session, with_settings
 from sniff.engine.table import Table
 from sniff.formats import read as open_capture
 from sniff.formats.parquet import I64, Kind
+from sniff.formats.several_buses import buses_in, chosen
 
 
 class NoDataFrames(ImportError):
@@ -41,19 +42,34 @@ class IncompleteCapture(UserWarning):
 
 
 def read(
-    path: str | Path, protocol: str | None = None, line: str | None = None, devices: str | Iterable[str] = ()
+    path: str | Path,
+    protocol: str | None = None,
+    line: str | None = None,
+    devices: str | Iterable[str] = (),
+    bus: str | None = None,
 ) -> DataCapture:
-    """Open a capture. `protocol`, `line`, `devices`: as -p, -s and -d say it; "9600,8N1", "3=NAME".
+    """Open a capture. `protocol`, `line`, `devices`: as -p, -s and -d say it; "9600,8N1", "3=NAME". `bus`: which one of
+    a file with several.
 
-    Raises CaptureError for a file that cannot be read, ValueError (registry.UnknownProtocol, devices.UnknownProfile)
-    for words that mean nothing.
+    Raises CaptureError for a file that cannot be read, or holds several buses where none is named, ValueError
+    (registry.UnknownProtocol, devices.UnknownProfile) for words that mean nothing.
     """
-    capture = open_capture(path)
+    whole = open_capture(path)
+    with chosen(bus):
+        capture, *others = buses_in(whole, path)
+    if others:
+        names = ", ".join(repr(one.session.bus) for one in (capture, *others))
+        raise CaptureError(f"{path}: {len(others) + 1} buses in it; choose with bus=NAME, one of {names}")
     session = with_settings(detected(capture.session), protocol, LineSettings.parse(line) if line is not None else None)
     dissector_for(session)
     words = (devices,) if isinstance(devices, str) else tuple(devices)
     said = profiles.devices(dict(map(profiles.assignment, words)))
     return DataCapture(str(path), capture, session, said.over(profiles.noted_devices(session)))
+
+
+def buses(path: str | Path) -> tuple[str, ...]:
+    """The names of the buses in a capture, one as a rule. Raises CaptureError."""
+    return tuple(one.session.bus for one in buses_in(open_capture(path), path))
 
 
 class DataCapture:

@@ -29,6 +29,7 @@ from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output
 from sniff.formats import read
 from tests.seeds import some
+from tests.site_of_two import site_of_two
 
 CAPTURES = Path(__file__).parents[2] / "captures"
 NAMES = sorted(
@@ -232,3 +233,17 @@ def test_the_package_alone_brings_no_library() -> None:
 def _without(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
     find = importlib.util.find_spec
     monkeypatch.setattr("importlib.util.find_spec", lambda name, *rest: None if name in names else find(name, *rest))
+
+
+@needs_polars
+def test_a_bus_of_several_is_named(tmp_path: Path) -> None:
+    clean, faults = CAPTURES / "rtu-clean.cap.txt", CAPTURES / "rtu-usual-faults.cap.txt"
+    site = site_of_two(tmp_path, clean, faults)
+    assert sniff.buses(site) == ("roof", "cellar")
+    assert sniff.buses(clean) == ("bus",)
+    for bus, path in zip(sniff.buses(site), (clean, faults), strict=True):
+        assert sniff.read(site, bus=bus).frames(octets=True).equals(sniff.read(path).frames(octets=True))
+    with pytest.raises(CaptureError, match="choose with bus=NAME, one of 'roof', 'cellar'"):
+        sniff.read(site)
+    with pytest.raises(CaptureError, match="no bus 'attic' in it"):
+        sniff.read(site, bus="attic")

@@ -6,14 +6,13 @@ import csv
 import io
 import json
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from sniff.formats import read
-from sniff.recording.writer import SharedFile
+from tests.site_of_two import site_of_two
 from tests.sniff.cli.conftest import Ran
 
 CAPTURES = Path(__file__).parents[3] / "captures"
@@ -24,19 +23,7 @@ Run = Callable[..., Ran]
 
 @pytest.fixture
 def site(tmp_path: Path) -> Path:
-    """A recording of two buses."""
-    captures = [read(CLEAN), read(FAULTS)]
-    items = [list(one.items()) for one in captures]
-    sessions = [replace(one.session, bus=name) for one, name in zip(captures, ("roof", "cellar"), strict=True)]
-    recorders = SharedFile(tmp_path / "site.mcap", sessions).recorders()
-    for recorder, own in zip(recorders, items, strict=True):
-        for item in own:
-            recorder.chunk(item)  # type: ignore[arg-type]
-    for recorder in recorders:
-        recorder.finish()
-    for recorder in recorders:
-        recorder.close()
-    return tmp_path / "site.mcap"
+    return site_of_two(tmp_path, CLEAN, FAULTS)
 
 
 def names(site: Path) -> list[str]:
