@@ -14,12 +14,16 @@ from pathlib import Path
 from sniff.analysis.sanitizing import sanitized
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, filtering, json_output
 from sniff.cli.progress import Watched
+from sniff.cli.writing import refuse_to_overwrite
 from sniff.engine.capture import Capture
 from sniff.formats.table import suffixes
 from sniff.reporting.collecting import collect
 from sniff.reporting.numbers import CaptureNumbers
 
 LIBRARIES = ("jinja2", "matplotlib")
+
+GENERATOR = b'<meta name="generator" content="sniff485 report">'
+"""What every page says of itself."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -35,6 +39,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="OUT",
         help="the page (default: FILE's name with .html, beside it or in this folder); - for standard output",
     )
+    parser.add_argument("-f", "--force", action="store_true", help="overwrite OUT, also where it is no such page")
     parser.add_argument("--json", action="store_true", help="the same numbers as JSON, one object a file, no page")
 
 
@@ -42,26 +47,34 @@ def run(args: argparse.Namespace) -> int:
     """Report on all captures, the parts of one recording as one."""
     if not args.json:
         require_libraries()
+    place = args.output or ("-" if args.json else str(default_place(args.files[0])))
+    if place != "-" and not _is_page(place):  # an earlier one is what everybody wants to be rid of
+        refuse_to_overwrite(Path(place), args.files, args.force)
     reports = [_numbers(name, capture, args) for name, capture in arguments.open_captures(args.files)]
     if args.json:
         text = "".join(json_output.dumps(report.to_json()) + "\n" for report in reports)
-        place = args.output or "-"
     else:
         from sniff.reporting.page import page
 
         text = page(reports)
-        place = args.output or str(default_place(args.files[0]))
     if place == "-":
         sys.stdout.write(text)
         return 0
-    if any(Path(place).resolve() == Path(file).resolve() for file in args.files if file != "-"):
-        raise Failure(f"{place}: is a capture that is being read; choose another name with -o", USAGE)
     try:
         Path(place).write_text(text, "utf-8", "backslashreplace")  # names need not be text
     except OSError as error:
         raise Failure(f"{place}: cannot be written: {error.strerror}", UNREADABLE) from None
     print(f"sniff485: report in {sanitized(place)}", file=sys.stderr)
     return 0
+
+
+def _is_page(place: str) -> bool:
+    """Whether a report stands there."""
+    try:
+        with open(place, "rb") as file:
+            return GENERATOR in file.read(1024)
+    except OSError:
+        return False
 
 
 def require_libraries() -> None:

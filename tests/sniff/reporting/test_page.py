@@ -145,6 +145,15 @@ def test_a_capture_is_never_overwritten(tmp_path: Path) -> None:
     assert capture.read_bytes() == before
 
 
+def test_what_is_no_page_is_overwritten_only_by_force(tmp_path: Path) -> None:
+    capture, other = CAPTURES / "n2-clean.cap.txt", tmp_path / "other.mcap"
+    other.write_bytes(b"a recording")
+    assert main(["report", str(capture), "-o", str(other)]) == 2
+    assert other.read_bytes() == b"a recording"
+    assert main(["report", str(capture), "-f", "-o", str(other)]) == 0
+    assert main(["report", str(capture), "-o", str(other)]) == 0  # a page by now
+
+
 def test_an_empty_capture_has_a_page(tmp_path: Path) -> None:
     capture = tmp_path / "empty.cap.txt"
     capture.write_text("#!sniff-capture 1\n# line: 9600,8N1\n# protocol: n2\n# start: 2026-03-01T10:00:00Z\n")
