@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from math import isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -108,18 +109,18 @@ def guess_of(point: Point, series: RegisterSeries, points: PointTable) -> Guesse
 
 
 def history(guess: RegisterGuess, blocks: Iterable[RegisterStretch]) -> tuple[tuple[int, float], ...]:
-    """Times, ns, and values, as the question that was asked most often tells them."""
+    """Times, ns, and values, as all questions tell them that asked for the whole."""
     width = guess.kind.registers
     whole = [
         block for block in blocks if block.first <= guess.address and guess.address + width <= block.first + block.width
     ]
-    if not whole:
-        return ()
-    block = max(whole, key=lambda one: one.count)
-    at = guess.address - block.first
-    values = read_as(block.words[:, at : at + width], guess.kind, guess.swapped, guess.little)
-    finite = np.isfinite(values).tolist()
-    return tuple((time, value) for time, value, good in zip(block.times, values.tolist(), finite, strict=True) if good)
+    told: list[tuple[int, float]] = []
+    for block in whole:
+        at = guess.address - block.first
+        values = read_as(block.words[:, at : at + width], guess.kind, guess.swapped, guess.little)
+        finite = np.isfinite(values).tolist()
+        told += [(time, value) for time, value, good in zip(block.times, values.tolist(), finite, strict=True) if good]
+    return tuple(sorted(told))
 
 
 def _told(guess: RegisterGuess, points: PointTable) -> Iterable[tuple[Key, GuessedPoint]]:
@@ -132,10 +133,15 @@ def _told(guess: RegisterGuess, points: PointTable) -> Iterable[tuple[Key, Guess
         row = np.array([[(raw or 0) & 0xFFFF for raw in raws]], np.uint16)
         value = float(read_as(row, guess.kind, guess.swapped, guess.little)[0])
     words = told(guess)
-    for step, key in enumerate(keys):
+    for step, (key, point) in enumerate(zip(keys, held, strict=True)):
         whole = len(raws) == len(held)
         covered, itself = step > 0 and whole, guess.kind is Kind.U16
-        yield key, GuessedPoint(words, value, guess.low, guess.high, guess.rate, covered, itself)
+        low, high, rate = guess.low, guess.high, guess.rate
+        if value is not None and isfinite(value):
+            low, high = min(low, value), max(high, value)
+        if itself and point is not None and point.low is not None and point.high is not None:
+            low, high, rate = point.low, point.high, point.rate or 0.0  # of every sample, where a guess has some
+        yield key, GuessedPoint(words, value, low, high, rate, covered, itself)
 
 
 def told(guess: RegisterGuess) -> str:

@@ -113,7 +113,30 @@ def guessed(blocks: Iterable[RegisterStretch], written: Collection[Span]) -> Ite
             taken.update(dict.fromkeys(_places(guess), guess))
     for guess in _left_over(held, taken):
         taken[guess.device, guess.space, guess.address] = guess
-    yield from (taken[place] for place in sorted(taken) if taken[place].address == place[2])
+    yield from (_over_all(held, taken[place]) for place in sorted(taken) if taken[place].address == place[2])
+
+
+def _over_all(blocks: Iterable[_Heard], guess: RegisterGuess) -> RegisterGuess:
+    """The guess with what all questions heard of it that asked for the whole of it, in the order of time."""
+    width = guess.kind.registers
+    told: list[tuple[Floats, Floats]] = []
+    answers = 0
+    for heard in blocks:
+        block, at = heard.block, guess.address - heard.block.first
+        if (block.device, block.space) == (guess.device, guess.space) and 0 <= at <= block.width - width:
+            words = heard.words[:, at : at + width]
+            told.append((heard.seconds, read_as(words, guess.kind, guess.swapped, guess.little)))
+            answers += block.count
+    if len(told) < 2:
+        return guess
+    seconds, values = (np.concatenate(parts) for parts in zip(*told, strict=True))
+    finite = np.isfinite(values)
+    in_order = np.argsort(seconds[finite], kind="stable")
+    seconds, values = seconds[finite][in_order], values[finite][in_order]
+    steps, span = np.diff(values), float(seconds[-1] - seconds[0])
+    rate = float(np.abs(steps).sum() / span) if span > 0 else 0.0
+    low, high, changes = float(values.min()), float(values.max()), int(np.count_nonzero(steps))
+    return replace(guess, low=low, high=high, answers=answers, changes=changes, rate=rate)
 
 
 def _places(guess: RegisterGuess) -> list[_Place]:
