@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from dissectors.frame import Frame
 from dissectors.profiles.brief_words import say_briefly
-from dissectors.profiles.decoding import Value, brief_title, decode, number, said_title, say
+from dissectors.profiles.decoding import Value, brief_title, decode, in_range, number, said_title, say
 from dissectors.profiles.model import Entry, Profile
 from dissectors.profiles.properties import due_property
 from dissectors.readings import PlaceName, Reading
@@ -179,9 +179,10 @@ class Meaning:
             word = entry.word_of(reading.address)
             return Item(reading, where, said_title(word), raw, None, reading.beside, brief_title(word))
         first, *bits = values
-        doubt = " (?)" if entry.doubt or not reading.sure else ""
+        doubt = " (?)" if entry.doubt or not reading.sure else _beyond(first)
         titled = _titled(first.entry or entry)
-        parts, text = (*_parts(entry, bits), *reading.beside), _text(first, raw) + doubt
+        why = (("doubtful", entry.doubt),) if entry.doubt else ()
+        parts, text = (*_parts(entry, bits), *why, *reading.beside), _text(first, raw) + doubt
         return Item(reading, where, titled, text, first, parts, brief_title(first.entry or entry))
 
 
@@ -204,6 +205,15 @@ def _text(value: Value, raw: str) -> str:
     text = raw if value.says_nothing else value.text
     held = raw if value.raw is None or isinstance(value.reading.value, float) else str(value.raw)
     return text if text in (held, f"{held} {value.unit}") else f"{text} ({held})"
+
+
+def _beyond(value: Value) -> str:
+    """ " (out of the range 0 … 400 Hz)": of a value that the profile does not allow."""
+    entry = value.entry
+    if entry is None or in_range(entry, value.value):
+        return ""
+    low, high = ("" if end is None else f"{end:g}" for end in (entry.low, entry.high))
+    return f" (out of the range {low} … {high} {entry.unit}".rstrip() + ")"
 
 
 def _parts(entry: Entry, values: Sequence[Value]) -> tuple[tuple[str, str], ...]:

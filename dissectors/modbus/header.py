@@ -59,6 +59,11 @@ def peek_ascii(frame: Frame) -> Header:
     return _peek(ASCII_NAME, octets, frame, error, len(octets) + missing if missing else None)
 
 
+def code_number(code: int) -> str:
+    """An exception code as people write it: those of the standard by their number, others as manuals do, 0x52."""
+    return f"{code}" if code in EXCEPTIONS else f"0x{code:02X}"
+
+
 def exception_name(code: int) -> str:
     """ "illegal data address", or "vendor 0x52" for a code that the standard does not name."""
     return EXCEPTIONS.get(code) or f"vendor 0x{code:02X}"

@@ -15,6 +15,7 @@ from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.exception_meanings import EXCEPTIONS, MAKER_EXCEPTION, USED_ALIKE, VENDOR_EXCEPTION
 from dissectors.modbus.finding_words import note_if, request_words, wilson
 from dissectors.modbus.functions import EXCEPTIONS as EXCEPTION_NAMES
+from dissectors.modbus.header import code_number
 from dissectors.modbus.response_groups import AnsweredRequest
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.station_record import Key, Requested, StationRecord, middle
@@ -278,11 +279,11 @@ def _exception(name: str, station: StationRecord, key: Key, code: int, tally: Ta
     """`maker`: what the manual of the device says of the code; it stands before the standard."""
     otherwise = MAKER_EXCEPTION if maker else VENDOR_EXCEPTION
     severity, means, following = otherwise if maker and code not in USED_ALIKE else EXCEPTIONS.get(code, otherwise)
-    meaning = maker or EXCEPTION_NAMES.get(code) or f"code 0x{code:02X} of the vendor's"
+    meaning = maker or EXCEPTION_NAMES.get(code) or "a code of the vendor's"
     request = station.requests.get(key)
     of = tally.count if request is None else request.tries
     some = "the only request" if of == 1 else f"{tally.count} of {of} requests"
-    words = f"exception {code} ({meaning}) to {some} to {request_words(key)}"
+    words = f"exception {code_number(code)} ({meaning}) to {some} to {request_words(key)}"
     return replace(tally.found(RULES["MB008"], name, words, severity), means=means, next=following)
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from dissectors.frame import Check, Damage, Frame, Header, Role
 from dissectors.modbus.envelope import ASCII_NAME, ascii_check, readable_adu, rtu_check
 from dissectors.modbus.functions import DIAGNOSTICS, EXCEPTION_BIT, FUNCTIONS
-from dissectors.modbus.header import NO_EXCEPTIONS, exception_name, kind_of
+from dissectors.modbus.header import NO_EXCEPTIONS, code_number, exception_name, kind_of
 from dissectors.modbus.layout import DEVICE_ID_CODES, DEVICE_ID_OBJECTS
 
 if TYPE_CHECKING:
@@ -45,7 +45,8 @@ def _line(frame: Frame, header: Header, role: Role, meaning: Meaning | None) -> 
     words = _words(octets, code, role)
     said = meaning.about if meaning is not None else ""
     if said and code & EXCEPTION_BIT and code not in NO_EXCEPTIONS and len(octets) > 2:
-        words = f"exception: {said} (code {octets[2]:02X}, {_asked(code)})"  # the maker's words, not the standard's
+        number = code_number(octets[2])  # the maker's words, not the standard's
+        words = f"exception: {said} (code {number}, {_asked(code)})"
     elif said:
         words = f"{said} — {words.removeprefix('read ')}" if said.startswith("read ") else f"{said} — {words}"
     if role is Role.BROADCAST:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dissectors.profiles.decoding import Value, each_bit, joined, number, phrases
+from dissectors.profiles.decoding import Value, each_bit, joined, mark, number, phrases
 from dissectors.profiles.model import EntryRole, Profile
 from dissectors.readings import Reading
 
@@ -66,7 +66,7 @@ def _nameless(value: Value, text: str) -> str:
 
 def _bare(value: Value, text: str) -> str:
     """A value without its name, where its unit or its bits say enough."""
-    return number(value.value, value.entry, value.unit) if _is_number(value) else _nameless(value, text)
+    return number(value.value, value.entry, value.unit) + mark(value) if _is_number(value) else _nameless(value, text)
 
 
 def _is_well(value: Value) -> bool:

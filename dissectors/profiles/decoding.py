@@ -125,7 +125,7 @@ def phrase(value: Value) -> str:
         return value.text
     if value.words == f"no {entry.title}":
         return value.words  # which says what of
-    return _told(brief_title(entry), value.text) + (" (?)" if _is_doubtful(value, entry) else "")
+    return _told(brief_title(entry), value.text) + mark(value)
 
 
 def _told(title: str, text: str) -> str:
@@ -136,6 +136,16 @@ def _told(title: str, text: str) -> str:
 def _attribute_phrase(value: Value, about: Entry) -> str:
     """An attribute or property of a known object with its name: "output frequency units degrees-celsius"."""
     return f"{brief_title(about)} {value.reading.part.replace('.', ' ')} {value.text}"
+
+
+def mark(value: Value) -> str:
+    """What stands behind a value that is not to be taken for granted: " (?)", " (out of range)"."""
+    entry = value.entry
+    if entry is None:
+        return ""
+    if _is_doubtful(value, entry):
+        return " (?)"
+    return "" if in_range(entry, value.value) else " (out of range)"
 
 
 def _is_doubtful(value: Value, entry: Entry) -> bool:

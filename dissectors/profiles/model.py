@@ -10,6 +10,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
+from dissectors.pseudonyms import is_blank
+from dissectors.readings import Reading
+
 
 class Kind(Enum):
     """How the bits of an entry are read. `size`: bits, 0 for what carries its own size."""
@@ -100,7 +103,8 @@ class Entry:
     manual writes it. `name`: of the point, the same for the same thing in every protocol of the device; `title`: for
     people; `label`: what the device itself calls it (BACnet's Object_Name). value = raw · `scale` + `offset`, in
     `unit`, within `low` … `high` (None: not said). `states_from`: the entry whose states these are; `like`: the entry
-    that says the same thing at another place. `written`: what a master writes there, in words, where that is no state
+    that says the same thing at another place. `printed_unit`: what the manual prints in place of `unit` by mistake: the
+    device itself may answer either. `written`: what a master writes there, in words, where that is no state
     ("password"). `reserved_codes`: codes that the manual lists without a meaning; `reserved_bits`: bits that are to be
     written as 0. `version`: the digits are a version, 0100h is 1.00; `hexadecimal`: people write it so, 0310h.
     `default`: as the device leaves the maker, scaled. `doubt`: why its meaning is not certain, in words.
@@ -118,6 +122,7 @@ class Entry:
     scale: float = 1.0
     offset: float = 0.0
     unit: str = ""
+    printed_unit: str = ""
     low: float | None = None
     high: float | None = None
     access: Access = Access.BOTH
@@ -174,6 +179,17 @@ class Sign:
     address: int
     part: str = ""
     value: int | float | str | None = None
+
+    def is_of(self, reading: Reading) -> bool:
+        """Whether a reading is of this place; a device object may have any instance."""
+        same = reading.address == self.address or self.space == "device"
+        return same and (reading.space, reading.part) == (self.space, self.part)
+
+    def fits(self, reading: Reading) -> bool | None:
+        """Whether a reading of this place is of such a device; None where a text was blanked."""
+        if isinstance(reading.value, str) and is_blank(reading.value):
+            return None
+        return self.value is None or reading.value == self.value
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,6 +260,13 @@ class Profile:
     def at(self, space: str, address: int) -> Entry | None:
         """The entry that covers a place; None when the profile has none."""
         return self._places.get((space, address))
+
+    def number_of(self, space: str, address: int) -> str:
+        """A place as the manual writes it: "0382h", "AI 10"."""
+        entry = self.at(space, address)
+        if space in ("holding", "input") and (entry is None or entry.kind.registers > 1):
+            return f"{address - self.address_offset:04X}h"
+        return entry.number if entry is not None else f"{space} {address}"
 
     def is_reserved(self, space: str, address: int) -> bool:
         """Whether the maker keeps a register for itself."""

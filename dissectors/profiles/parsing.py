@@ -197,6 +197,7 @@ def _entry(
         scale=table.number("scale", 1.0),
         offset=table.number("offset", 0.0),
         unit=table.text("unit", ""),
+        printed_unit=table.text("printed-unit", ""),
         low=low,
         high=high,
         access=Access(table.choice("access", [access.value for access in Access], "rw")),

@@ -14,7 +14,7 @@ from dissectors.frame import Event, Frame, Header, Role
 from dissectors.line import Timing
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
-from dissectors.profiles.decoding import Value, bit_words, decode, in_range, number, plain_name, state_words
+from dissectors.profiles.decoding import Value, bit_words, decode, in_range, number, state_words
 from dissectors.profiles.model import Entry, EntryRole, Profile
 from dissectors.profiles.properties import due_property
 from dissectors.readings import Origin, Reading
@@ -180,10 +180,14 @@ class ProfileFindings:
         if profile is None:
             return
         who = _subject(profile, station)
+        before: Entry | None = None
         for reading in readings:
             entry = None if reading.part else profile.at(reading.space, reading.address)
+            if entry is not None and entry is before:
+                continue  # the next word of a number that is judged already
+            before = entry
             if profile.is_reserved(reading.space, reading.address):
-                place = entry.number if entry is not None else plain_name(reading.space, reading.address)
+                place = profile.number_of(reading.space, reading.address)
                 if profile.forbids(reading.space, reading.address, reading.raw):
                     self._add("PR002", who, place, f"{reading.value} written to reserved {place}", frame.end, no)
             elif f"{reading.space}:{reading.part}" in profile.limits_on(self._family).read_only:
@@ -205,6 +209,7 @@ class ProfileFindings:
         if profile is None:
             return
         who = _subject(profile, sample.device)
+        self._judge_identity(profile, value.reading, who, sample)
         self._judge_range(value, who, sample.time, sample.frame)
         entry = value.entry
         if value.reading.part:
@@ -217,6 +222,15 @@ class ProfileFindings:
         else:
             for code, words in _told_by_bits(entry, value.raw):
                 self._add_trouble(code, who, OF_STATUS, f"{entry.title}: {words}", sample)
+
+    def _judge_identity(self, profile: Profile, reading: Reading, who: Subject, sample: Sample) -> None:
+        sign = next((sign for sign in profile.signs if sign.is_of(reading) and sign.value is not None), None)
+        if sign is None or sign.value is None or sign.fits(reading) is not False:
+            return
+        place = reading.part or profile.number_of(reading.space, reading.address)
+        shown, due = (f"{one:04X}h" if isinstance(one, int) else number(one) for one in (reading.value, sign.value))
+        seen = f"{place} is {shown}, {profile.title} has {due}"
+        self._add("PR011", who, place, seen, sample.time, sample.frame)
 
     def _judge_property(self, profile: Profile, reading: Reading, who: Subject, sample: Sample) -> None:
         entry = profile.at(reading.space, reading.address)

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from dissectors.manifest import Dissector
-from dissectors.profiles.decoding import decode, in_range
-from dissectors.profiles.model import Profile, Sign
+from dissectors.profiles.decoding import Value, decode, in_range
+from dissectors.profiles.model import Entry, Profile, Sign
 from dissectors.readings import Reading
 from dissectors.tracker import Verdict
 from sniff.analysis.point_reader import PointReader
@@ -19,6 +19,9 @@ LEAST = 0.3
 
 MOST_PLACES = 4096
 _RESERVED_WEIGHT = 0.3  # a block read over a reserved register says little
+_ANY_WEIGHT = 0.3  # of a place that may hold any value
+_STRANGE_SHARE = 0.3  # of what a place is worth that holds what the profile does not allow
+_UNNAMED_WEIGHT = 2.0  # of what may be any other device, where nothing that names it was read
 _SIGN_WEIGHT = 4.0
 _CONSTANT_WEIGHT = 2.0  # of a property of the device object: people may change its name
 _SPACES = {"read-holding-registers": "holding", "read-input-registers": "input"}
@@ -86,53 +89,78 @@ class Guessing:
 def guess(heard: HeardPlaces, profile: Profile) -> Guess:
     """How well a profile fits what a station answered.
 
-    The share of answered places that the profile knows, lowered by values out of its range, by places that it should
-    have and that were refused; signs of identity weigh four places, a wrong one rules it out.
+    The share of answered places that the profile knows, lowered by values that it does not allow, by reserved places
+    that hold something, by places that it should have and that were refused, and as long as nothing was read that names
+    the device: other devices have numbers like these too. What may hold any value tells little. Signs of identity weigh
+    four places, a wrong one rules it out.
     """
     total = weight = 0.0
-    known = strange = 0
+    places = known = strange = 0
+    is_named = False
     for (space, address, part), reading in heard.answered.items():
-        if part:
+        if part or any(sign.value is not None and sign.is_of(reading) for sign in profile.signs):
             continue
-        total += 1
+        places += 1
         entry = profile.at(space, address)
-        if entry is None or entry.reserved:
-            weight += _RESERVED_WEIGHT if profile.is_reserved(space, address) else 0
+        if profile.is_reserved(space, address):
+            total += 1.0 if reading.raw else _RESERVED_WEIGHT
+            weight += _RESERVED_WEIGHT
+            continue
+        if entry is None:
+            total += 1
             continue
         known += 1
-        fits = all(value.bit or in_range(entry, value.value) for value in decode(profile, (reading,)))
+        worth = _worth(entry)
+        total += worth
+        fits = all(value.bit or _is_allowed(entry, value) for value in decode(profile, (reading,)))
         strange += not fits
-        weight += 1.0 if fits else 0.3
+        weight += worth if fits else _STRANGE_SHARE * worth
     refused = sum(profile.at(*place) is not None for place in heard.refused)
-    words = [f"{known} of {int(total)} places known"]
-    words += [f"{strange} out of range"] if strange else []
+    words = [f"{known} of {places} places known"]
+    words += [f"{strange} not allowed"] if strange else []
     words += [f"{refused} refused that it should have"] if refused else []
     total += refused
     for (space, _, part), reading in heard.answered.items():
         if space == "device" and part in profile.constants:
             same = reading.value == profile.constants[part]
+            is_named |= same and isinstance(reading.value, str)
             total += _CONSTANT_WEIGHT
             weight += _CONSTANT_WEIGHT if same else 0
             words.append(f"{part} {'fits' if same else 'is another'}")
     for sign in profile.signs:
         verdict = _check(sign, heard)
         if verdict is False:
-            return Guess(heard.station, profile, 0.0, f"{_name(sign)} says otherwise")
+            return Guess(heard.station, profile, 0.0, f"{_name(sign, profile)} says otherwise")
         if verdict:
+            is_named |= sign.value is not None
             total += _SIGN_WEIGHT
             weight += _SIGN_WEIGHT
-            words.append(f"{_name(sign)} fits")
+            words.append(f"{_name(sign, profile)} {'is there' if sign.value is None else 'fits'}")
+    if not is_named:
+        total += _UNNAMED_WEIGHT
+        words.append("nothing was read that names it")
     return Guess(heard.station, profile, weight / total if total else 0.0, ", ".join(words))
 
 
 def _check(sign: Sign, heard: HeardPlaces) -> bool | None:
-    """Whether a sign was seen and right; None when it was not seen. A device object may have any instance."""
-    for (space, address, part), reading in heard.answered.items():
-        here = space == sign.space and part == sign.part and (address == sign.address or space == "device")
-        if here:
-            return sign.value is None or reading.value == sign.value
-    return None
+    """Whether a sign was seen and right; None when it was not seen."""
+    return next((sign.fits(reading) for reading in heard.answered.values() if sign.is_of(reading)), None)
 
 
-def _name(sign: Sign) -> str:
-    return f"{sign.space} {sign.address}" + (f" {sign.part}" if sign.part else "")
+def _worth(entry: Entry) -> float:
+    """How much it tells that a place answers as the profile has it: little where any value would do, nothing of a
+    parameter of which only its number is known."""
+    if entry.states or entry.reserved_bits or entry.parts or entry.low is not None or entry.high is not None:
+        return 1.0
+    return 0.0 if entry.title.endswith(f" {entry.name}") else _ANY_WEIGHT
+
+
+def _is_allowed(entry: Entry, value: Value) -> bool:
+    """Whether the profile allows a value: of a list of codes or states, whether it has that one."""
+    raw = value.raw or 0
+    is_listed = not entry.states or entry.low is not None or raw in entry.states or entry.written != ""
+    return in_range(entry, value.value) and is_listed and not entry.reserved_in(raw)
+
+
+def _name(sign: Sign, profile: Profile) -> str:
+    return " ".join(filter(None, (profile.number_of(sign.space, sign.address), sign.part)))

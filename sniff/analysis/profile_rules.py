@@ -98,7 +98,8 @@ PROFILE_RULES: dict[str, Rule] = {
             "PR011",
             Severity.NOTE,
             "property other than in the manual",
-            "A station answered a name or unit of an object that its manual gives otherwise.",
+            "A station answered a name or unit of an object that its manual gives otherwise, or a vendor name, an "
+            "ident number or a model code of another device.",
             "another software version of the device, the wrong profile, or somebody renamed the object",
             "compare the device with its profile (`profile guess`)",
         ),

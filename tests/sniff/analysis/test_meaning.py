@@ -116,7 +116,7 @@ def test_the_makers_words_replace_the_standards(tmp_path: Path) -> None:
     _, lines = modbus(tmp_path, ("0306 2501 0001", "0386 05"), E510)
     assert lines == [
         "3 ← run, forward — write register 0x2501 = 1",
-        "3 → exception: write mode error (code 05, write register)",
+        "3 → exception: write mode error (code 5, write register)",
     ]
 
 
@@ -144,3 +144,15 @@ def test_a_property_is_compared_with_the_manual(name: str) -> None:
     shown = tree(rows[7])
     assert shown["analog-input 4 present-value"] == "29.5"
     assert shown["property-identifier"] == "present-value (85)"
+
+
+def test_a_value_out_of_its_range_is_marked(tmp_path: Path) -> None:
+    rows, lines = modbus(tmp_path, ("0303 2524 0001", "0303 02 ffff"), E510)
+    assert lines[1].startswith("3 → output frequency 655.35 Hz (out of range) — ")
+    named = tree(rows[1])["Register 2524h (wire 0x2524) output frequency"]
+    assert named == "655.35 Hz (65535) (out of the range 0 … 599 Hz)"
+
+
+def test_a_code_of_the_makers_own_is_written_as_in_manuals(tmp_path: Path) -> None:
+    _, lines = modbus(tmp_path, ("0303 2524 0001", "0383 52"), E510)
+    assert lines[1].endswith("(code 0x52, read holding)")

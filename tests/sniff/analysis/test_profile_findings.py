@@ -13,7 +13,7 @@ import pytest
 from dissectors.findings import Finding, Severity
 from dissectors.profiles import Devices
 from dissectors.profiles.decoding import decode
-from dissectors.profiles.packaged import packaged
+from dissectors.profiles.packaged import packaged, parse_text
 from dissectors.readings import Origin, Reading
 from sniff.analysis.health import health_of
 from sniff.analysis.judging import Judging
@@ -94,7 +94,7 @@ def test_trip_bits_of_the_acn() -> None:
 
 def test_the_acns_reserved_span() -> None:
     assert brief(judged(("010604000001", "018602"), devices=ACN)) == [
-        ("PR002", "drive 1", "1 written to reserved holding/41025")
+        ("PR002", "drive 1", "1 written to reserved 0401h")
     ]
 
 
@@ -271,3 +271,34 @@ def test_a_device_has_the_numbers_of_its_manual(station: int, profile: str | Non
     for output in bus.run(bus.chunks((f"{at}03 2520 0001", f"{at}03 02 0005")), session):
         judging.add(output)
     assert [one.code for one in judging.findings() if one.code in ("PR012", "MB205")] == codes
+
+
+def test_a_number_of_several_registers_is_written_once() -> None:
+    """A write of both words of one number is one write."""
+    document = """
+name = "meter"
+title = "Meter"
+protocols = ["modbus-rtu"]
+[[modbus.register]]
+address = 0x10
+name = "energy"
+access = "r"
+type = "u32"
+"""
+    found = judged(("0110001000020400000005", "011000100002"), devices=Devices(default=parse_text(document, "meter")))
+    assert brief(found) == [("PR003", "device 1", "energy (0010h) written, it is read only")]
+
+
+def test_who_writes_the_display_selection_of_a_drive_is_not_accused() -> None:
+    assert brief(judged(("01102510000204000000ff", "011025100002"))) == []
+
+
+@pytest.mark.parametrize(
+    ("answer", "expected"),
+    [
+        ("0103020006", []),
+        ("0103020007", [("PR011", "drive 1", "0300h is 0007h, AutomationDirect ACN drive has 0006h")]),
+    ],
+)
+def test_a_device_that_says_it_is_another(answer: str, expected: list[tuple[str, str, str]]) -> None:
+    assert brief(judged(("010302ff0001", answer), devices=ACN)) == expected

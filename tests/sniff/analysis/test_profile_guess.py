@@ -6,6 +6,8 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from dissectors.bacnet.application import confirmed
 from dissectors.bacnet.envelope import npdu_frame
 from dissectors.bacnet.f510 import f510
@@ -43,7 +45,7 @@ def guesses(*exchanges: tuple[str, str | None]) -> list[Guess]:
 def test_the_acn_says_its_name() -> None:
     best = guesses(("010302ff0001", "0103020006"), ("0103030f0002", "01030400321770"))[0]
     assert (best.station, best.profile.name, best.score) == (1, "automationdirect-acn", 1.0)
-    assert "holding 767 fits" in best.why
+    assert "0300h fits" in best.why
 
 
 def test_a_wrong_sign_rules_a_profile_out() -> None:
@@ -52,11 +54,38 @@ def test_a_wrong_sign_rules_a_profile_out() -> None:
 
 
 def test_what_is_refused_counts_against() -> None:
-    fine = guesses(("010325240001", "0103020000"))
-    less = guesses(("010325240001", "0103020000"), ("010325270001", "018302"))
-    assert fine[0].score == 1.0
-    assert less[0].score == 0.5
+    fine = guesses(("010325200005", "01030a00000000000000000000"))
+    less = guesses(("010325200005", "01030a00000000000000000000"), ("010325270001", "018302"))
+    assert less[0].score < fine[0].score
     assert "1 refused that it should have" in less[0].why
+
+
+@pytest.mark.parametrize("first", [0x0000, 0x0100, 0x0300])
+def test_registers_that_any_device_has_name_none(first: int) -> None:
+    """The first registers of a meter: many drives have parameters there, which may hold anything."""
+    values = [2301, 2310, 65535, 12, 40000, 0, 9999, 31000, 17, 500]
+    answer = "010314" + "".join(f"{value:04x}" for value in values)
+    assert [guess for guess in guesses((f"0103{first:04x}000a", answer)) if guess.score >= 0.5] == []
+
+
+def test_how_sure_it_is_when_nothing_names_the_device() -> None:
+    (best, other, *_) = guesses(("010325240001", "0103021770"))
+    assert {best.profile.name, other.profile.name} == {"teco-e510", "teco-f510"}
+    assert best.score == other.score < 0.5
+    assert "nothing was read that names it" in best.why
+
+
+@pytest.mark.parametrize(("code", "first"), [(0x0B, "teco-f510"), (0x2F, "teco-e510")])
+def test_a_fault_code_that_only_one_has_speaks_for_it(code: int, first: str) -> None:
+    found = guesses(("010325200004", f"0103080000{code:04x}00000000"))
+    assert [guess.profile.name for guess in found][:2][0] == first
+    assert found[0].score > found[1].score
+
+
+def test_a_reserved_register_at_nought_is_no_hint_against() -> None:
+    (zero, *_) = guesses(("010325240004", "010308" + "1770" + "0000" + "0ce4" + "0020"))
+    (held, *_) = guesses(("010325240004", "010308" + "1770" + "0001" + "0ce4" + "0020"))
+    assert held.score < zero.score
 
 
 def test_strange_registers_give_no_guess() -> None:
