@@ -182,6 +182,15 @@ def with_devices(session: Session, chosen: Devices) -> Session:
     return replace(session, notes={**session.notes, DEVICES_NOTE: chosen.text()}, profiles=chosen.documents)
 
 
+def made_for(profile: Profile, protocol: str) -> Profile | None:
+    """Another packaged profile of the same device, for a protocol that this one does not speak of."""
+    if protocol in profile.protocols or not profile.models:
+        return None
+    others = (packaged(name) for name in names())
+    same = (one for one in others if (one.vendor, one.models) == (profile.vendor, profile.models))
+    return next((one for one in same if protocol in one.protocols), None)
+
+
 def _meant(name: str, documents: Mapping[str, str]) -> Profile:
     """The profile that was in force when a capture was made, else that of this name here."""
     return parse_text(documents[name], f"{name} of the capture") if name in documents else find(name)

@@ -104,13 +104,22 @@ def noted_devices(args: argparse.Namespace, session: Session) -> Devices:
     """What -d says, and behind it what the capture says, as far as it holds such profiles or they are known here."""
     if not getattr(args, "devices", ()) and DEVICES_NOTE not in session.notes:
         return Devices()
-    from sniff.devices import EVERY, noted, noted_devices
+    from sniff.devices import EVERY, made_for, noted, noted_devices
 
     _, unknown = noted(session)
     if unknown and EVERY not in dict(args.devices):
         names = ascii(", ".join(unknown)[:200])
         print(f"sniff485: {names}: a device of the capture that is not known here; say which with -d", file=sys.stderr)
-    return devices_of(args).over(noted_devices(session))
+    found = devices_of(args).over(noted_devices(session))
+    for profile in found.profiles:
+        other = made_for(profile, session.protocol)
+        if other is not None:
+            print(
+                f"sniff485: {profile.name} has the register numbers of {', '.join(profile.protocols)}, as behind a "
+                f"gateway; for a device that speaks {session.protocol} itself take {other.name}",
+                file=sys.stderr,
+            )
+    return found
 
 
 def line_settings(token: str) -> LineSettings:

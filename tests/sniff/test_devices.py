@@ -9,7 +9,7 @@ import pytest
 
 from dissectors.profiles import ProfileError
 from sniff import devices as profile_files
-from sniff.devices import UnknownProfile, available, devices, find
+from sniff.devices import UnknownProfile, available, devices, find, made_for
 
 PUMP = 'name = "pump"\ntitle = "{title}"\nprotocols = ["modbus-rtu"]\n'
 
@@ -90,3 +90,11 @@ def test_devices() -> None:
     for wrong in ("300", "x", "-1"):
         with pytest.raises(ValueError, match="expected an address 0 … 255"):
             devices({wrong: "teco-e510"})
+
+
+def test_another_profile_of_the_device_for_the_protocol_of_the_capture() -> None:
+    acn, card = find("automationdirect-acn"), find("automationdirect-acn-eth")
+    assert made_for(acn, "modbus-tcp") == card
+    assert made_for(card, "modbus-rtu") == acn
+    assert made_for(acn, "modbus-rtu") is None
+    assert made_for(find("teco-e510"), "modbus-tcp") is None
