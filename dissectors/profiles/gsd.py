@@ -14,11 +14,11 @@ profile has no entries.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from dissectors.line import NS_PER_S
 from dissectors.profiles.checked import ProfileError
-from dissectors.profiles.model import Limits, Profile
+from dissectors.profiles.model import Limits, Profile, Sign
 
 FIRST = "#profibus_dp"
 _LINE = re.compile(r"(?P<key>[A-Za-z0-9_.]+)\s*(?:\([^)]*\))?\s*=\s*(?P<value>.+)")
@@ -87,7 +87,8 @@ def parse_gsd(text: str, origin: str) -> Profile:
         noun="slave",
         protocols=("profibus",),
         entries=(),
-        limits={"profibus": Limits(responses=_responses(said))},
+        limits={"profibus": Limits(responses=response_times(_numbers(said)))},
+        signs=(Sign("dp-ident", 0, value=ident),),
         facts={key: _kept(said[key.lower()]) for key in _KEPT if key.lower() in said} | _modules(modules),
         source=f"GSD file, revision {_text(said.get('revision', '')) or 'not said'}",
         origin=origin,
@@ -116,14 +117,18 @@ def _without_comment(line: str) -> str:
     return line
 
 
-def _responses(said: dict[str, str]) -> dict[int, int]:
-    """ns that it may take to answer, by rate."""
+def response_times(said: Mapping[str, int]) -> dict[int, int]:
+    """ns that a device may take to answer, by rate, from its keywords in small letters."""
     times: dict[int, int] = {}
-    for key, value in said.items():
-        rate, bits = _RATES.get(key.removeprefix("maxtsdr_")), _number(value)
-        if key.startswith("maxtsdr_") and rate is not None and bits is not None and bits > 0:
+    for key, bits in said.items():
+        rate = _RATES.get(key.removeprefix("maxtsdr_"))
+        if key.startswith("maxtsdr_") and rate is not None and bits > 0:
             times[rate] = bits * NS_PER_S // rate
     return times
+
+
+def _numbers(said: Mapping[str, str]) -> dict[str, int]:
+    return {key: number for key, value in said.items() if (number := _number(value)) is not None}
 
 
 def _modules(modules: list[str]) -> dict[str, str | int]:

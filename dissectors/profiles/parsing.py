@@ -9,6 +9,7 @@ from typing import Any
 
 from dissectors.line import MS
 from dissectors.profiles.checked import CheckedTable, ProfileError
+from dissectors.profiles.gsd import response_times
 from dissectors.profiles.model import Access, Bit, BitField, Entry, EntryRole, Kind, Limits, Profile, Sign
 
 REGISTER_TABLES = ("holding", "input")
@@ -28,6 +29,9 @@ def parse(data: Mapping[str, Any], origin: str) -> Profile:
     objects = [_object(table, _n2_place(table), n2=True) for table in n2.tables("object")]
     objects += [_object(table, _bacnet_place(table)) for table in bacnet.tables("object")]
     objects += [_entry(table, *_word_place(table), None) for table in profibus.tables("word")]
+    facts = _constants(profibus.table("device"))
+    times = response_times({key.lower(): value for key, value in facts.items() if isinstance(value, int)})
+    limits = {family.path: _limits(family.table("limits")) for family in (modbus, n2, bacnet, profibus)}
     profile = Profile(
         name=name,
         title=top.text("title"),
@@ -36,12 +40,12 @@ def parse(data: Mapping[str, Any], origin: str) -> Profile:
         noun=top.text("noun", "device"),
         protocols=top.texts("protocols"),
         entries=_with_shared_meaning(origin, (*registers, *objects)),
-        limits={family.path: _limits(family.table("limits")) for family in (modbus, n2, bacnet, profibus)},
+        limits={**limits, profibus.path: replace(limits[profibus.path], responses=times)},
         exceptions=exceptions,
         signs=tuple(_sign(table, modbus) for table in top.tables("sign")),
         properties=_properties(bacnet.table("properties")),
         constants=_constants(bacnet.table("device")),
-        facts=_constants(profibus.table("device")),
+        facts=facts,
         absent=absent,
         reserved=_reserved(modbus),
         address_offset=modbus.whole("address-offset", 0),

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dissectors.profiles import ProfileError
-from dissectors.profiles.packaged import parse_text
+from dissectors.profiles.packaged import packaged, parse_text
 from sniff.devices import devices
 
 PUMP = """; made up
@@ -64,3 +64,10 @@ def test_words_of_the_drive_have_its_own_lists() -> None:
     assert 37 in alarm.reserved_codes
     assert {entry.address for entry in drive.in_space("dp-output")} == set(range(16))
     assert {entry.address for entry in drive.in_space("dp-input")} == set(range(16))
+
+
+def test_the_gsd_in_a_document_says_how_long_answers_take_as_the_file_does() -> None:
+    f510 = packaged("teco-f510")
+    told = f510.limits_on("profibus").responses
+    assert (told[9_600], told[1_500_000], told[12_000_000]) == (6_250_000, 100_000, 66_666)  # 60, 150 and 800 bits
+    assert [(sign.space, sign.value) for sign in parse_text(PUMP, "pump.gsd").signs] == [("dp-ident", 0x80AB)]
