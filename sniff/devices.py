@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dissectors import registry
 from dissectors.installed import entry_points
 from dissectors.profiles import Devices, ProfileError
 from dissectors.profiles.model import Profile
@@ -189,6 +190,17 @@ def made_for(profile: Profile, protocol: str) -> Profile | None:
     others = (packaged(name) for name in names())
     same = (one for one in others if (one.vendor, one.models) == (profile.vendor, profile.models))
     return next((one for one in same if protocol in one.protocols), None)
+
+
+def says_of(profile: Profile, protocol: str) -> bool:
+    """Whether a profile can say something on a bus of that protocol: of it, or of one that has the same registers."""
+    if protocol in profile.protocols:
+        return True
+    try:
+        families = {registry.get(name).profile_family for name in profile.protocols}
+        return registry.get(protocol).profile_family in families
+    except registry.UnknownProtocol:  # somebody else's: nobody here can tell
+        return True
 
 
 def _meant(name: str, documents: Mapping[str, str]) -> Profile:

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from dissectors import registry
 from dissectors.line import LineSettings
@@ -17,6 +18,9 @@ from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.session import ASSUMED, AUTO, DEVICES_NOTE, LINE_NOTE, OPTIONS, PROTOCOL_NOTE, Session
 from sniff.formats import read
 from sniff.formats.several_buses import SeveralBuses, buses_in
+
+if TYPE_CHECKING:
+    from dissectors.profiles.model import Profile
 
 
 def add_line(parser: argparse.ArgumentParser, auto: bool = True) -> None:
@@ -104,7 +108,7 @@ def noted_devices(args: argparse.Namespace, session: Session) -> Devices:
     """What -d says, and behind it what the capture says, as far as it holds such profiles or they are known here."""
     if not getattr(args, "devices", ()) and DEVICES_NOTE not in session.notes:
         return Devices()
-    from sniff.devices import EVERY, made_for, noted, noted_devices
+    from sniff.devices import EVERY, noted, noted_devices
 
     _, unknown = noted(session)
     if unknown and EVERY not in dict(args.devices):
@@ -112,14 +116,23 @@ def noted_devices(args: argparse.Namespace, session: Session) -> Devices:
         print(f"sniff485: {names}: a device of the capture that is not known here; say which with -d", file=sys.stderr)
     found = devices_of(args).over(noted_devices(session))
     for profile in found.profiles:
-        other = made_for(profile, session.protocol)
-        if other is not None:
-            print(
-                f"sniff485: {profile.name} has the register numbers of {', '.join(profile.protocols)}, as behind a "
-                f"gateway; for a device that speaks {session.protocol} itself take {other.name}",
-                file=sys.stderr,
-            )
+        _say_what_it_is_for(profile, session.protocol)
     return found
+
+
+def _say_what_it_is_for(profile: Profile, protocol: str) -> None:
+    """Say where a profile is of little or no use on a bus of that protocol."""
+    from sniff.devices import made_for, says_of
+
+    other = made_for(profile, protocol)
+    if not says_of(profile, protocol):
+        print(f"sniff485: {profile.name} says nothing of {protocol}: {', '.join(profile.protocols)}", file=sys.stderr)
+    elif other is not None:
+        print(
+            f"sniff485: {profile.name} has the register numbers of {', '.join(profile.protocols)}, as behind a "
+            f"gateway; for a device that speaks {protocol} itself take {other.name}",
+            file=sys.stderr,
+        )
 
 
 def line_settings(token: str) -> LineSettings:

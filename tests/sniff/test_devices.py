@@ -9,7 +9,7 @@ import pytest
 
 from dissectors.profiles import ProfileError
 from sniff import devices as profile_files
-from sniff.devices import UnknownProfile, available, devices, find, made_for
+from sniff.devices import UnknownProfile, available, devices, find, made_for, says_of
 
 PUMP = 'name = "pump"\ntitle = "{title}"\nprotocols = ["modbus-rtu"]\n'
 
@@ -98,3 +98,10 @@ def test_another_profile_of_the_device_for_the_protocol_of_the_capture() -> None
     assert made_for(card, "modbus-rtu") == acn
     assert made_for(acn, "modbus-rtu") is None
     assert made_for(find("teco-e510"), "modbus-tcp") is None
+
+
+def test_what_a_profile_has_nothing_to_say_of() -> None:
+    e510 = find("teco-e510")
+    assert all(says_of(e510, name) for name in ("modbus-rtu", "modbus-ascii", "modbus-tcp", "mstp", "bacnet-ip"))
+    assert not any(says_of(e510, name) for name in ("n2", "profibus"))
+    assert says_of(find("automationdirect-acn-eth"), "modbus-rtu")
