@@ -60,6 +60,7 @@ class EntryRole(Enum):
     COMMAND = "command"  # tells the device what to do
     FAULT = "fault"  # the device has stopped because of it
     ALARM = "alarm"  # the device warns
+    RUNNING = "running"  # it runs: what may be written only while it is stopped may not be written
 
 
 _OUTPUTS = "dp-output"
@@ -81,7 +82,7 @@ class Bit:
 class BitField:
     """Several bits of a register that are one number: bits `low` … `high`, `states` its values in words.
 
-    `roles`: those of its values that say that the device has a fault, or warns.
+    `roles`: those of its values that say that the device has a fault, warns, or runs.
     """
 
     low: int

@@ -233,10 +233,9 @@ def _bits(table: CheckedTable) -> tuple[Bit, ...]:
 
 
 def _roles(table: CheckedTable, what: str) -> dict[int, EntryRole]:
-    """Bits or states that say that the device has a fault, or warns: `fault-bits`, `alarm-states` …"""
-    return {
-        number: role for role in (EntryRole.FAULT, EntryRole.ALARM) for number in table.numbers(f"{role.value}-{what}")
-    }
+    """Bits or states that say that the device has a fault, warns or runs: `fault-bits`, `running-states` …"""
+    roles = EntryRole.FAULT, EntryRole.ALARM, EntryRole.RUNNING
+    return {number: role for role in roles for number in table.numbers(f"{role.value}-{what}")}
 
 
 def _bit(table: CheckedTable, number: int, value: Any) -> Bit:

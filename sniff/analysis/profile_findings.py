@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 from dissectors.findings import Finding, Severity, Tally
 from dissectors.frame import Event, Frame, Header, Role
-from dissectors.line import Timing
+from dissectors.line import NS_PER_S, Timing
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.profiles.decoding import Value, bit_words, decode, in_range, number, state_words
-from dissectors.profiles.model import Entry, EntryRole, Profile
+from dissectors.profiles.model import Access, Entry, EntryRole, Profile
 from dissectors.profiles.properties import due_property
 from dissectors.readings import Origin, Reading
 from dissectors.row_columns import RowColumns, in_turn
@@ -33,6 +33,9 @@ CODES = {EntryRole.FAULT: "PR004", EntryRole.ALARM: "PR005"}
 
 OF_STATUS = "status word"
 """Which of several things about a device: what its status word says, without saying why."""
+
+STATE_HOLDS = 10 * NS_PER_S
+"""How long what a device said of its state is taken to be so."""
 
 Key = tuple[str, Subject, str]
 """Code, subject, and which of several things about it."""
@@ -70,6 +73,7 @@ class ProfileFindings:
         self._answers: dict[Subject, int] = {}
         self._asks = dissector.asks
         self._in_vain: dict[int, _InVain] = {}  # by transaction
+        self._running: dict[int, tuple[int, str]] = {}  # by station: when it said that it runs, and how
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
         """Take the next row."""
@@ -200,8 +204,35 @@ class ProfileFindings:
                 words = " ".join(f"{bit:X}" for bit in bits)
                 seen = f"{entry.title} ({entry.number}) written with reserved bits {words} set"
                 self._add("PR008", who, f"{entry.name} {words}", seen, frame.end, no)
+            elif entry is not None and entry.access is Access.STOPPED and (state := self._state_at(station, frame)):
+                seen = f"{entry.title} ({entry.number}) written while its state was {state}; it is taken while stopped"
+                self._add("PR013", who, entry.name, seen, frame.end, no)
+            if entry is not None and entry.role is EntryRole.COMMAND:
+                self._forget_state(station)
         for value in decode(profile, readings):
             self._judge_range(value, who, frame.end, no)
+
+    def _state_at(self, station: int | None, frame: Frame) -> str:
+        """How a station said lately that it runs; empty where it did not."""
+        since, state = self._running.get(-1 if station is None else station, (0, ""))
+        return state if frame.end - since <= STATE_HOLDS else ""
+
+    def _forget_state(self, station: int | None) -> None:
+        """A command may change it; without a `station` that of all."""
+        if station is None:
+            self._running.clear()
+        else:
+            self._running.pop(station, None)
+
+    def _note_state(self, entry: Entry, raw: int, sample: Sample) -> None:
+        states = _running_states(entry, raw)
+        if sample.device is None or not states:
+            return
+        said = next(filter(None, states), "")
+        if said:
+            self._running[sample.device] = sample.time, said
+        else:
+            self._forget_state(sample.device)
 
     def _judge_value(self, sample: Sample) -> None:
         profile = self._devices.at(sample.device)
@@ -220,6 +251,7 @@ class ProfileFindings:
             for words in _troubles(entry, value):
                 self._add_trouble(CODES[entry.role], who, f"{entry.name} {words}", f"{entry.title}: {words}", sample)
         else:
+            self._note_state(entry, value.raw, sample)
             for code, words in _told_by_bits(entry, value.raw):
                 self._add_trouble(code, who, OF_STATUS, f"{entry.title}: {words}", sample)
 
@@ -290,6 +322,14 @@ def _troubles(entry: Entry, value: Value) -> Iterator[str]:
         words = state_words(entry, code) or bit_words(entry, raw)
         unknown = "reserved in the manual" if code in entry.reserved_codes else "not in the manual"
         yield words if entry.high == 1 else f"code {code}, {words or unknown}"
+
+
+def _running_states(entry: Entry, raw: int) -> list[str]:
+    """Of each bit and number in several bits that tells whether the device runs: how it does, empty where it stands."""
+    bits = [bit.on if raw >> bit.number & 1 else "" for bit in entry.bits if bit.role is EntryRole.RUNNING]
+    parts = [part for part in entry.parts if EntryRole.RUNNING in part.roles.values()]
+    held = [(part, part.of(raw)) for part in parts]
+    return bits + [part.states.get(at, f"{at}") if part.roles.get(at) is EntryRole.RUNNING else "" for part, at in held]
 
 
 def _told_by_bits(entry: Entry, raw: int) -> Iterator[tuple[str, str]]:

@@ -111,5 +111,14 @@ PROFILE_RULES: dict[str, Rule] = {
             "the wrong profile, or another device than the plan says",
             "compare the device with its profile (`profile guess`)",
         ),
+        Rule(
+            "PR013",
+            Severity.NOTE,
+            "written while the device runs",
+            "A master writes what the device's manual lets it write only while it is stopped, within ten seconds of an "
+            "answer that said that it runs, and no command in between.",
+            "the device refuses it, or takes it without doing it; or it was stopped at its own keypad meanwhile",
+            "stop the device first; then read back what was written",
+        ),
     )
 }

@@ -302,3 +302,26 @@ def test_who_writes_the_display_selection_of_a_drive_is_not_accused() -> None:
 )
 def test_a_device_that_says_it_is_another(answer: str, expected: list[tuple[str, str, str]]) -> None:
     assert brief(judged(("010302ff0001", answer), devices=ACN)) == expected
+
+
+RUNS, STANDS, SAVE = ("010303040001", "0103020031"), ("010303040001", "0103020000"), ("010603df0001", "010603df0001")
+STOP = ("010603810002", "010603810002")
+
+
+@pytest.mark.parametrize(
+    ("exchanges", "told"),
+    [
+        ((RUNS, SAVE), True),
+        ((RUNS, RUNS, SAVE), True),
+        ((SAVE,), False),  # nobody knows
+        ((STANDS, SAVE), False),
+        ((RUNS, STANDS, SAVE), False),
+        ((RUNS, STOP, SAVE), False),  # it was told to stop
+        ((RUNS, *(("010303100001", "0103020000"),) * 100, SAVE), False),  # ten seconds later
+    ],
+)
+def test_what_is_written_while_the_drive_runs(exchanges: tuple[tuple[str, str], ...], told: bool) -> None:
+    found = [finding for finding in judged(*exchanges, devices=ACN) if finding.code == "PR013"]
+    assert [finding.seen for finding in found] == [
+        "save parameters (03E0h) written while its state was forward; it is taken while stopped"
+    ] * told
