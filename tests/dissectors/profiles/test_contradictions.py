@@ -33,7 +33,8 @@ def test_a_value_that_one_protocol_allows_is_in_the_range_of_the_other() -> None
     [
         *((F510, "holding", address) for address in (0x2505, 0x2506, 0x252A, 0x252B)),  # volts or milliamperes
         *((F510, "holding", address) for address in (0x000C, 0x000D, 0x0C19, 0x0C1A)),  # Hz or per cent, V or per cent
-        *((F510, space, number) for space, number in (("AI", 13), ("AI", 14), ("AO", 6), ("AO", 7))),
+        *((F510, "AI", number) for number in (13, 14)),
+        *((F510, "AO", number) for number in (2, 3, 6, 7)),
         *((ACN, "holding", address - 1) for address in (0x1159, 0x140C, 0x140D, 0x140F, 0x1410, 0x1B49, 0x1B4B)),
     ],
 )
