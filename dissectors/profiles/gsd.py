@@ -88,7 +88,7 @@ def parse_gsd(text: str, origin: str) -> Profile:
         protocols=("profibus",),
         entries=(),
         limits={"profibus": Limits(responses=response_times(_numbers(said)))},
-        signs=(Sign("dp-ident", 0, value=ident),),
+        signs=(Sign("dp-ident", 0, value=ident, title="ident number"),),
         facts={key: _kept(said[key.lower()]) for key in _KEPT if key.lower() in said} | _modules(modules),
         source=f"GSD file, revision {_text(said.get('revision', '')) or 'not said'}",
         origin=origin,

@@ -174,12 +174,13 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Sign:
-    """What a device of this kind answers at a place: for guessing. `value` None: it answers at all."""
+    """What a device of this kind answers at a place. `value` None: it answers at all; `title`: for people."""
 
     space: str
     address: int
     part: str = ""
     value: int | float | str | None = None
+    title: str = ""
 
     def is_of(self, reading: Reading) -> bool:
         """Whether a reading is of this place; a device object may have any instance."""

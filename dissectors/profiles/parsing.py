@@ -335,7 +335,7 @@ def _sign(table: CheckedTable, modbus: CheckedTable) -> Sign:
     value = table.data.get("value")
     if "value" in table and not isinstance(value, int | float | str):
         raise table.error("value", f"expected a number or a text, not {value!r}")
-    sign = Sign(space, address, table.text("part", ""), value)
+    sign = Sign(space, address, table.text("part", ""), value, table.text("title", ""))
     table.finish()
     return sign
 

@@ -259,7 +259,7 @@ class ProfileFindings:
         sign = next((sign for sign in profile.signs if sign.is_of(reading) and sign.value is not None), None)
         if sign is None or sign.value is None or sign.fits(reading) is not False:
             return
-        place = reading.part or profile.number_of(reading.space, reading.address)
+        place = sign.title or reading.part or profile.number_of(reading.space, reading.address)
         shown, due = (f"{one:04X}h" if isinstance(one, int) else number(one) for one in (reading.value, sign.value))
         seen = f"{place} is {shown}, {profile.title} has {due}"
         self._add("PR011", who, place, seen, sample.time, sample.frame)

@@ -163,4 +163,4 @@ def _is_allowed(entry: Entry, value: Value) -> bool:
 
 
 def _name(sign: Sign, profile: Profile) -> str:
-    return " ".join(filter(None, (profile.number_of(sign.space, sign.address), sign.part)))
+    return sign.title or " ".join(filter(None, (profile.number_of(sign.space, sign.address), sign.part)))

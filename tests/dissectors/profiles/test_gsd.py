@@ -70,4 +70,5 @@ def test_the_gsd_in_a_document_says_how_long_answers_take_as_the_file_does() -> 
     f510 = packaged("teco-f510")
     told = f510.limits_on("profibus").responses
     assert (told[9_600], told[1_500_000], told[12_000_000]) == (6_250_000, 100_000, 66_666)  # 60, 150 and 800 bits
-    assert [(sign.space, sign.value) for sign in parse_text(PUMP, "pump.gsd").signs] == [("dp-ident", 0x80AB)]
+    (sign,) = parse_text(PUMP, "pump.gsd").signs
+    assert (sign.space, sign.value, sign.title) == ("dp-ident", 0x80AB, "ident number")
