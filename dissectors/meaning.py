@@ -117,7 +117,7 @@ class Meaning:
             if lacks or (entry is not None and not entry.reserved):
                 title = brief_title(entry) if entry is not None else f"{one.space} {one.address}"
                 part = f" {one.part.replace('.', ' ')}" if one.part else ""
-                titles.append(title + part + (" (this device has none)" if lacks else ""))
+                titles.append(title + part + (" (none by its manual)" if lacks else ""))
         return ", ".join(dict.fromkeys(titles))
 
     def questions(self, place: PlaceName) -> Iterator[tuple[str, str]]:
@@ -130,7 +130,7 @@ class Meaning:
             where = place(one, _number(entry, one, offset, kept), offset)
             title = "reserved" if kept else "" if entry is None else _titled(entry)
             lacks = profile is not None and profile.lacks(one.space, one.part)
-            without = [f"this device has no {one.part or 'present-value'}"] if lacks else []
+            without = [f"no {one.part or 'present-value'} by its manual"] if lacks else []
             yield where, "; ".join(part for part in (title, *without) if part)
 
     @property
