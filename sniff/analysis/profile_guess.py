@@ -123,7 +123,7 @@ def guess(heard: HeardPlaces, profile: Profile) -> Guess:
     for (space, _, part), reading in heard.answered.items():
         if space == "device" and part in profile.constants:
             same = reading.value == profile.constants[part]
-            is_named |= same and isinstance(reading.value, str)
+            is_named |= same and part.endswith("-name")  # a version or a place may be anybody's
             total += _CONSTANT_WEIGHT
             weight += _CONSTANT_WEIGHT if same else 0
             words.append(f"{part} {'fits' if same else 'is another'}")

@@ -14,6 +14,7 @@ from dissectors.bacnet.f510 import f510
 from dissectors.bacnet.readings import readings
 from dissectors.frame import Check, FoundBy, Frame
 from dissectors.profiles.packaged import packaged
+from dissectors.readings import Origin, Reading
 from sniff.analysis.profile_guess import Guess, Guessing, HeardPlaces, guess
 from sniff.bus.offline import outputs
 from sniff.engine.engine import Output
@@ -125,3 +126,12 @@ def test_a_device_as_its_manual_has_it_fits_wholly() -> None:
     assert len(heard.answered) == len(profile.constants)
     best = guess(heard, profile)
     assert (best.score, "is another" in best.why) == (1.0, False), best.why
+
+
+def test_a_version_names_no_device() -> None:
+    profile = next(profile for profile in PROFILES if profile.name == "teco-f510")
+    heard = HeardPlaces(5)
+    for part in ("firmware-revision", "location"):
+        value = profile.constants[part]
+        heard.answered["device", 5, part] = Reading("device", 5, None, value, Origin.READ, part)
+    assert "nothing was read that names it" in guess(heard, profile).why
