@@ -111,7 +111,7 @@ class Exchanges:
             else:
                 verdict = of_chain([*self.chain, request], self._learnt) if self.chain else Verdict.NO_RESPONSE
         self.drop_chain(Verdict.UNDECIDED if verdict is Verdict.UNDECIDED else Verdict.NO_RESPONSE)
-        if verdict is Verdict.NO_RESPONSE:
+        if verdict in (Verdict.NO_RESPONSE, Verdict.OPEN):  # a first frame that waited may be answered late, too
             self.given_up.append(request)
         self.closed.append(request.close(verdict))
 

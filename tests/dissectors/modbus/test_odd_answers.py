@@ -179,3 +179,10 @@ def test_two_dead_stations_that_are_written_to_in_turns_are_dead(bus, timeout):
         bus.say("030600050007", timeout).say("010600090007", timeout)
         bus.exchange(OTHER, OTHER_VALUES, pause=timeout)
     assert graves_of(bus) >= {("MB001", "station 1"), ("MB001", "station 3")}
+
+
+def test_the_first_frame_of_a_capture_may_be_a_write_that_is_confirmed_late(bus):
+    for number in range(5):
+        bus.say("0306000500ff", 900).say(OTHER, 1000).say("0306000500ff", 10)
+        bus.say(f"020302{number:04x}", 20)
+    assert graves_of(bus) == {("MB103", "station 3")}
