@@ -79,11 +79,13 @@ class Timing:
 
     `latency`: ns that adapter and host may hold an octet back (FTDI: latency timer + 1 ms); 0 for exact times.
     `is_told`: whether that is known; else it is what the reads seem to say, and single times may be later still.
+    `has_rate`: whether the baud rate of `line` is the bus's; else it is what such a bus normally runs at.
     """
 
     line: LineSettings = LineSettings()
     latency: int = 0
     is_told: bool = True
+    has_rate: bool = True
 
     @property
     def char(self) -> int:

@@ -43,8 +43,8 @@ class Echoes:
         """Whether a sure request repeats the newest one at once; a master repeats only after its timeout."""
         if newest is None or newest.octets != seen.octets or newest.answered or newest.fault or newest.garble:
             return False  # behind a damaged answer a master may repeat at once
-        if self._timing.latency >= AT_ONCE and self.usual is False:
-            return False  # no times tell, but others do
+        if self._timing.latency >= AT_ONCE and (self.usual is False or (self.usual is None and _has_copies(newest))):
+            return False  # no times tell, but others do; or there are more copies than one echo makes
         gap = newest.gap(seen.frame.start)
         if self._learnt.timeout is not None:
             return gap < self.limit or gap * 8 < self._learnt.timeout
@@ -79,7 +79,10 @@ class Echoes:
         return request.octets == seen.octets or (has_no_layout(seen) and request.is_for(seen.octets))
 
     def note(self, gap: int) -> None:
-        """A request that is surely one came back `gap` ns after it."""
+        """A request that is surely one came back `gap` ns after it. Where times do not tell that it came at once, only
+        its answer shows an echo."""
+        if self.usual is None and self._timing.latency < AT_ONCE:
+            self.usual = True
         self._gaps.append(gap)
 
     def _usual_gap(self) -> int:
@@ -111,3 +114,8 @@ class Echoes:
         self._votes = max(-ECHO_VOTES, min(ECHO_VOTES, self._votes + (1 if echoed else -1)))
         if self._votes:
             self.usual = self._votes > 0
+
+
+def _has_copies(request: Exchange) -> bool:
+    """Whether a request came twice already: with an echo, or as a repeat of one."""
+    return request.echoed or request.attempt > 1

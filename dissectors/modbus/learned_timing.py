@@ -28,9 +28,20 @@ than that it may be the answer of a slow station as well as the request again.""
 class LearnedTiming:
     """Response times by unit, the master's timeout, its pauses between an answer and the next request."""
 
-    __slots__ = ("_answer", "_cycles", "_margin", "_pauses", "_timeout", "_times", "_tolerance", "_unanswered")
+    __slots__ = (
+        "_answer",
+        "_cycles",
+        "_latency",
+        "_margin",
+        "_pauses",
+        "_timeout",
+        "_times",
+        "_tolerance",
+        "_unanswered",
+    )
 
     def __init__(self, timing: Timing) -> None:
+        self._latency = timing.latency
         self._margin = _MARGIN + timing.latency
         self._answer = _ANSWER_CHARS * timing.char
         self._tolerance = _MARGIN + timing.latency + 4 * timing.char
@@ -61,8 +72,11 @@ class LearnedTiming:
         """A sure request got nothing for `elapsed`; then a master sent another, or the same one again (`repeated`).
 
         Not a timeout when answers have been waited for longer: then a second master broke in, or the answer was missed.
-        Nor when it is no longer than an answer and the pause after it may take: then the answer was missed, too.
+        Nor when it is no longer than an answer and the pause after it may take: then the answer was missed, too. What
+        is shorter than octets may be held back, or has no times at all, is no wait that was measured.
         """
+        if elapsed < self._latency:
+            return
         cycle = self._slowest() + self._answer + max(self._pauses, default=0) * 11 // 10
         if elapsed <= (self._slowest() if repeated or not self._pauses else cycle):
             return

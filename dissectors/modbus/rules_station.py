@@ -237,7 +237,8 @@ def _foreign(seen: BusRecord, name: str, station: StationRecord) -> Finding | No
         words += f", always the same {_octets(len(same))}: {_hex(same)}"
     if factor is not None:
         baud = seen.timing.line.baud
-        words += f"; its bits are {factor} times as long as those of this line: about {baud // factor} Bd, not {baud}"
+        rates = f": about {baud // factor} Bd, not {baud}" if seen.timing.has_rate else ", whose baud rate nobody said"
+        words += f"; its bits are {factor} times as long as those of this line{rates}"
     return garbage.tally.found(RULES["MB014"], name, words)
 
 

@@ -96,8 +96,6 @@ class ModbusTracker(TrackerMemory):
         if odd is not None and self._held.open is not None:
             return self._answer(self._held.open, seen, odd)
         if sure and self._echoes.is_of_request(self._held.open or self._held.last, seen):
-            if self._echoes.usual is None:
-                self._echoes.usual = True
             newest = self._held.open or self._held.last
             self._echoes.note(0 if newest is None else newest.gap(seen.frame.start))
             return self._echo(seen)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dissectors.frame import Role
-from dissectors.tracker import Verdict
 from sniff.analysis.line_findings import COUNTED_OCTETS, LineFindings
 from sniff.analysis.other_settings import SAMPLE_OCTETS
 
@@ -96,12 +95,7 @@ class BulkLineFindings(LineFindings):
 
     def _settle_many(self, closed: TransactionColumns) -> None:
         """Take transactions that closed."""
-        from dissectors.columns import NONE, VERDICTS
-
         if not len(closed):
             return
         self._patterns.settle_many(closed)
-        echoes = closed.verdict == VERDICTS.index(Verdict.ECHO)
-        self._asked += int(((closed.request != NONE) & ~echoes).sum())
-        for start, no in zip(closed.start[echoes].tolist(), closed.request[echoes].tolist(), strict=True):
-            self._echo.add(start, None if no == NONE else no)
+        self._echoes.settle_many(closed)

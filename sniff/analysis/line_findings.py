@@ -13,9 +13,10 @@ from dissectors.findings import Finding, Severity, Tally, as_consequence, counte
 from dissectors.frame import Chunk, Damage, Event, Flaw, Frame, LineError, Noise, Place, Reason, Role
 from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
-from dissectors.tracker import Transaction, Verdict
+from dissectors.tracker import Transaction
 from dissectors.words import milliseconds
 from sniff.analysis.breaks import LEVELS, breaks_in
+from sniff.analysis.echo_findings import EchoesHeard
 from sniff.analysis.judgement import Heard, Judgement
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.line_use import LineUse
@@ -39,9 +40,6 @@ OUTWEIGHED = 20
 
 MENDED_LEAST = 3
 """So many frames that are good but for one and the same thing are a system, and prove the settings as good ones do."""
-
-ECHOES_LEAST = 3
-"""Echoes from which on a repeater or converter is likely, where half of the requests have one."""
 
 COUNTED_OCTETS = 4096
 """Of longer rows the octets are not counted by value."""
@@ -92,7 +90,7 @@ class LineFindings:
         self._unplugged_at: int | None = None
         self._away = 0
         self._lost_octets = self._only_heard = 0
-        self._echo, self._asked = Tally(), 0
+        self._echoes = EchoesHeard(session.timing.latency)
         self._values: Counter[int] = Counter()
         self._before_ok = True  # the newest frame
         self._awaiting = False  # a request was the newest frame of a known kind
@@ -148,10 +146,7 @@ class LineFindings:
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
         self._patterns.settle(transaction)
-        if transaction.verdict is Verdict.ECHO:
-            self._echo.add(transaction.start, transaction.request)
-        elif transaction.request is not None:
-            self._asked += 1
+        self._echoes.settle(transaction)
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""
@@ -361,7 +356,8 @@ class LineFindings:
         asked, fit = self._fit
         if self._sampled >= 2 * asked or (asked < self._sampled >= SAMPLE_OCTETS):
             session = self._session
-            fit = what_fits(self._sample, session.line, session.adapter.latency, session.protocol)
+            timing = session.timing
+            fit = what_fits(self._sample, session.line, timing.latency, session.protocol, timing.has_rate)
             self._fit = self._sampled, fit
         return fit
 
@@ -389,13 +385,9 @@ class LineFindings:
             yield rests
         frames = {name: one.frames for name, one in self._senders.by_name.items() if name != BUS}
         yield from self._pieces.found(frames, MASTER)
-        if self._echo.count:
-            words = f"{self._echo.count} of {counted(self._asked, 'request')} came twice, the copy directly behind"
-            if self._echo.count > self._asked:  # several copies of one, or of some that are still open
-                words = f"{counted(self._echo.count, 'request')} came directly behind the same request"
-            often = self._echo.count >= ECHOES_LEAST and 2 * self._echo.count >= self._asked
-            severity = Severity.WARNING if often else None
-            yield self._echo.found(RULES["LN205"], "bus", words, severity)
+        echoes = self._echoes.found()
+        if echoes is not None:
+            yield echoes
 
     def _whole(self, code: str, subject: str, words: str) -> Finding:
         return found(RULES[code], subject, words, first=self._first, last=self._now)

@@ -45,11 +45,14 @@ class Fit:
     next: str
 
 
-def what_fits(sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: str) -> Fit | None:
-    """What these octets are; None where nothing can be said. `protocol`: the one that they are not."""
+def what_fits(
+    sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: str, has_rate: bool = True
+) -> Fit | None:
+    """What these octets are; None where nothing can be said. `protocol`: the one that they are not. `has_rate`: whether
+    they were received at the baud rate of `line`, and not at one that nobody said."""
     if sum(len(chunk.octets) for chunk in sample) < LEAST_OCTETS:
         return None
-    return next(_fits(sample, line, latency, protocol), None)
+    return next(_fits(sample, line, latency, protocol, has_rate), None)
 
 
 def other_protocol(sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: str) -> Fit | None:
@@ -62,7 +65,7 @@ def other_protocol(sample: Sequence[Chunk], line: LineSettings, latency: int, pr
     return _as_protocol(found, "these octets read", f"somebody speaks {found.protocol}", f"-p {found.protocol}")
 
 
-def _fits(sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: str) -> Iterator[Fit]:
+def _fits(sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: str, has_rate: bool) -> Iterator[Fit]:
     """The surest first: what reads with good checks, then what the octets themselves exclude."""
     evidence = _evidence(sample, line, latency)
     if (hint := evidence.hint()) is not None and hint.data_bits == 7 and line.data_bits == 8:
@@ -83,7 +86,7 @@ def _fits(sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: s
             "change A and B at the tap",
         )
     yield from _by_values(sample, line)
-    yield from _by_rate(sample, line)
+    yield from _by_rate(sample, line, has_rate)
 
 
 def _as_protocol(found: Candidature, how: str, means: str, settle: str) -> Fit:
@@ -146,11 +149,17 @@ def _by_values(sample: Sequence[Chunk], line: LineSettings) -> Iterator[Fit]:
     )
 
 
-def _by_rate(sample: Sequence[Chunk], line: LineSettings) -> Iterator[Fit]:
+def _by_rate(sample: Sequence[Chunk], line: LineSettings, has_rate: bool) -> Iterator[Fit]:
     """A bus that is slower, or faster, than the port listens."""
     factor = slower_by(_bursts(sample, line, LONG_SILENCE)[:BURSTS], line)
     bursts = _bursts(sample, line, SHORT_SILENCE)
-    if factor:
+    if factor and not has_rate:
+        yield Fit(
+            f"wrong baud rate: every level lasts a multiple of {factor} bits, so the bus is that much slower",
+            "the bus is slower than the port that received it, whose baud rate nobody said",
+            f"listen at the {factor}th part of that rate, or `detect`",
+        )
+    elif factor:
         about = f"{factor} times slower, about {line.baud // factor} Bd" if factor < 12 else "over 10 times slower"
         yield Fit(
             f"wrong baud rate: every level lasts a multiple of {factor} bits, so the bus is {about}",
@@ -159,10 +168,12 @@ def _by_rate(sample: Sequence[Chunk], line: LineSettings) -> Iterator[Fit]:
         )
     elif _too_short(bursts):
         often = ", ".join(burst.hex(" ").upper() for burst, _ in Counter(bursts).most_common(2))
+        port = f"the {line.baud} Bd of the port" if has_rate else "the port"
+        rate = f"{line.baud} Bd" if has_rate else port
         yield Fit(
-            f"wrong baud rate: the bus is faster than {line.baud} Bd; the same few octets come again and again "
+            f"wrong baud rate: the bus is faster than {rate}; the same few octets come again and again "
             f"({often}), too few for a frame",
-            f"the bus is faster than the {line.baud} Bd of the port, which takes some levels of a frame for octets",
+            f"the bus is faster than {port}, which takes some levels of a frame for octets",
             "listen with the next higher rates (-s), or `detect`",
         )
 

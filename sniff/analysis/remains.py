@@ -78,7 +78,8 @@ class Remains:
         factor = slower_by(rests, line)
         if not factor:
             return finding
-        rate = f"{factor} times slower, at about {line.baud // factor} Bd" if factor < 12 else "over 10 times slower"
+        rate = f"{factor} times slower" if factor < 12 else "over 10 times slower"
+        rate += f", at about {line.baud // factor} Bd" if factor < 12 and not self._session.line_is_assumed else ""
         return replace(
             finding,
             seen=f"{finding.seen}; every level in them lasts a multiple of {factor} bits: they were sent {rate}",

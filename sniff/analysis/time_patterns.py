@@ -403,7 +403,8 @@ class TimePatterns:
         """Why the octets of a stretch are no noise; empty where they may be."""
         if not stretch.asked:
             session, stretch.asked = self._session, True
-            stretch.fit = what_fits(stretch.sample, session.line, session.adapter.latency, session.protocol)
+            timing = session.timing
+            stretch.fit = what_fits(stretch.sample, session.line, timing.latency, session.protocol, timing.has_rate)
         if stretch.fit is not None:
             return stretch.fit.seen
         if 3 * stretch.marked >= stretch.octets and stretch.count >= 10:

@@ -136,7 +136,8 @@ class Session:
     def timing(self) -> Timing:
         """The line with what the adapter allows."""
         latency, said_by = self.adapter.latency, self.adapter.latency_from
-        return Timing(self.line, latency, said_by not in UNNAMED and not said_by.startswith(INFERRED))
+        is_told = said_by not in UNNAMED and not said_by.startswith(INFERRED)
+        return Timing(self.line, latency, is_told, has_rate=not self.line_is_assumed)
 
     def found(self, line: LineSettings | None, protocol: str | None) -> Session:
         """The session once its search has ended with these settings."""

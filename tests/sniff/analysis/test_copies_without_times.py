@@ -1,0 +1,60 @@
+"""Logs whose times do not tell an echo from a request again: what is said of their copies, and of their line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+
+from dissectors.findings import Finding, Severity
+from dissectors.modbus.envelope import seal_rtu
+from sniff.analysis.told_protocol import detected
+from sniff.engine.session import with_settings
+from sniff.formats import read
+from tests.faults.judged import findings_of
+
+READ = [seal_rtu(bytes((1, 3, 0, 16 + place, 0, 1))) for place in range(8)]
+VALUE = [seal_rtu(bytes((1, 3, 2, 0, place))) for place in range(8)]
+SLOWER = bytes.fromhex("00788080780078787880788078 80F8 00".replace(" ", ""))
+"""What 9600 Bd makes of seven characters at 2400 Bd, but for one bit."""
+
+
+def findings(path: Path, frames: Iterable[bytes], clock: str = "") -> dict[str, Finding]:
+    path.write_text("".join(f"{clock}{frame.hex(' ')}\n" for frame in frames))
+    log = read(path)
+    session = with_settings(detected(log.session), "modbus-rtu")
+    return {one.code: one for one in findings_of(session, log.items())}
+
+
+@pytest.fixture(params=["", "13:44:06 "], ids=["no times", "seconds"])
+def clock(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.mark.parametrize("copies", [2, 3, 5])
+def test_requests_again_that_nobody_answers_are_not_called_an_echo(tmp_path: Path, clock: str, copies: int) -> None:
+    said = findings(tmp_path / "x.log", [one for one in READ for _ in range(copies)], clock)
+    echo = said.get("LN205")
+    assert echo is None or (echo.severity < Severity.WARNING and "a master that repeats" in echo.seen)
+
+
+def test_answers_behind_copies_show_an_echo(tmp_path: Path, clock: str) -> None:
+    frames = [frame for pair in zip(READ, READ, VALUE, strict=True) for frame in pair]
+    said = findings(tmp_path / "x.log", frames, clock)
+    assert said["LN205"].severity is Severity.WARNING
+    assert said["LN205"].seen == "8 of 8 requests came twice, the copy directly behind"
+    assert "MB002" not in said
+
+
+def test_repeats_within_one_second_do_not_tell_how_long_the_master_waits(tmp_path: Path) -> None:
+    frames = [READ[0], SLOWER, READ[0], SLOWER, *[READ[1]] * 5, READ[2], SLOWER, READ[2], SLOWER, READ[2], SLOWER]
+    said = findings(tmp_path / "x.log", frames, "13:44:06 ")
+    assert said["MB014"].count == 5
+    assert said["LN204"].severity < Severity.WARNING
+
+
+def test_no_rate_is_told_of_a_line_whose_own_rate_nobody_said(tmp_path: Path) -> None:
+    said = findings(tmp_path / "x.log", [frame for one in READ for frame in (one, SLOWER)])
+    assert "4 times as long as those of this line, whose baud rate nobody said" in said["MB014"].seen
+    assert " Bd" not in said["MB014"].seen + said["LN204"].seen
