@@ -6,7 +6,7 @@ the line, the start bit, then the data bits, the lowest first:
     78h     0 000 1111 0|      two whole runs of 4, and one that the stop bit cuts off: 1/4 of the baud rate fits
 
 So all runs but the last one of a character are multiples of k. Noise is not like that, nor is another protocol at the
-same baud rate. Pure.
+same baud rate. Where that one speaks in text, its octets are printable, with a parity in bit 7 perhaps. Pure.
 """
 
 from __future__ import annotations
@@ -29,6 +29,9 @@ _MOST: Final = _FACTORS[0]
 _LATE_EDGE: Final = 0x80  # a bit of eight: low up to the last data bit, or up to the end
 _LONG = 6  # octets
 _STRAY = 20  # one octet in so many may not fit: an edge that jitter moved
+_PRINTABLE: Final = frozenset(b"\r\n\t") | frozenset(range(0x20, 0x7F))
+_TEXT_BITS: Final = log2(256 / len(_PRINTABLE))  # that one of them is no chance
+_MIXED = 8  # octets of text with bit 7 as parity that have it set, and so many that have not
 
 
 def whole_runs(octet: int) -> list[int]:
@@ -60,6 +63,26 @@ def slower_by(stretches: Iterable[bytes]) -> int | None:
     return None
 
 
+def text_of(stretches: Iterable[bytes]) -> tuple[str, str] | None:
+    """The newest stretch as text, where all of them are text, and the parity that bit 7 is ("even", "odd", or "" where
+    it is always 0); None otherwise."""
+    each = list(stretches)
+    octets = b"".join(each)
+    if len(octets) * _TEXT_BITS < _CERTAIN:
+        return None
+    low = bytes(octet & 0x7F for octet in octets)
+    if sum(octet in _PRINTABLE for octet in low) * _STRAY < (_STRAY - 1) * len(low):
+        return None
+    high = sum(octet > 0x7F for octet in octets)
+    parity = ""
+    if high * _STRAY > len(octets):
+        odd = sum(octet.bit_count() & 1 for octet in octets)
+        if min(odd, len(octets) - odd) * _STRAY > len(octets) or min(high, len(octets) - high) < _MIXED:
+            return None
+        parity = "odd" if odd else "even"
+    return bytes(octet & 0x7F for octet in each[-1]).decode("ascii"), parity
+
+
 def _are_of_two_levels(stretches: Sequence[bytes]) -> bool:
     """Whether most are long and change between the only two octets there are where a bit outlasts a character: a
     break has none of the one, the ringing of a driver none of the other."""
@@ -75,6 +98,7 @@ class Garbage:
     stretches: deque[bytes] = field(default_factory=lambda: deque(maxlen=_STRETCHES_KEPT))
     marked: int = 0  # of them with line errors
     begun: int = 0  # of them that begin as the answer should
+    of_text: bool = False  # what should have come is text, too
     _counts: Counter[bytes] = field(default_factory=Counter)
 
     def add(self, octets: bytes, time: int, *frames: int | None, is_marked: bool = False, begins: bool = False) -> None:
@@ -97,10 +121,15 @@ class Garbage:
         """See the function of that name; None where there is too little of it."""
         return slower_by(self.stretches) if self.tally.count >= _LEAST else None
 
+    def text(self) -> tuple[str, str] | None:
+        """See `text_of`; None where there is too little of it, or text is what should have come."""
+        is_any = self.tally.count >= _LEAST and not self.of_text and 2 * self.begun <= self.tally.count
+        return text_of(self.stretches) if is_any else None
+
     @property
     def is_system(self) -> bool:
-        """Whether the sender makes it so: always the same, or in longer bits; not what breaks characters on the way."""
-        if self.slower_by() is not None:
+        """Whether the sender makes it so: always the same, in longer bits, or text; not what spoils octets."""
+        if self.slower_by() is not None or self.text() is not None:
             return True
         broken_on_the_way = 2 * self.marked > self.tally.count and 2 * self.begun > self.tally.count
         return self.always() is not None and not broken_on_the_way

@@ -358,9 +358,9 @@ class ModbusFindings(RowObserver):
             return
         if len(stray) == STRAY_KEPT or self.seen.late_speakers.is_due_from_another(asked.unit, transaction.start):
             return  # two may have spoken at once, which says nothing of how this one speaks
-        begins = stray[:1] == b":" if asked.frame.protocol != RTU_NAME else stray[:1] == asked.octets[:1]
-        frames = transaction.request, transaction.response
-        marked = transaction.id in self.marked
+        station.garbage.of_text = asked.frame.protocol != RTU_NAME
+        begins = stray[:1] == (b":" if station.garbage.of_text else asked.octets[:1])
+        frames, marked = (transaction.request, transaction.response), transaction.id in self.marked
         station.garbage.add(stray, transaction.end, *frames, is_marked=marked, begins=begins)
         excess = _excess(asked, stray)
         if excess is not None and self._outlasts(transaction, asked):

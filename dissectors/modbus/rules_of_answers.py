@@ -144,8 +144,8 @@ ANSWER_RULES = (
         Severity.ERROR,
         "answers in something else",
         "Octets in place of answers, at least three times and most of what came so: always the same ones, or such that "
-        "all runs of equal bits are multiples of 2 … 8, as a slower line looks when it is read too fast. Noise is "
-        "never the same twice, and neither are two stations that talk at once.",
+        "all runs of equal bits are multiples of 2 … 8, as a slower line looks when it is read too fast; or text. "
+        "Noise is never the same twice, nor text, and neither are two stations that talk at once.",
         "the device has another baud rate, or speaks another protocol",
         "baud rate, parity and protocol in the device's settings",
         explains=(
@@ -155,10 +155,13 @@ ANSWER_RULES = (
             "MB004",
             "MB104",
             "MB105",
+            "LN101",
+            "LN103",
             "LN201",
             "LN202",
             "LN203",
             "LN204",
+            "LN303",
             *_OF_DAMAGE,
         ),
     ),

@@ -37,6 +37,8 @@ FLAWS = {
 _NOT_THERE = (1, 2, 3)  # exceptions that tell a program that tries what a device can do
 _PROBED = 8  # times that something else is asked for each try
 _NEARLY_ALL_LEAST = 10  # damaged answers
+_GARBLED_LEAST = 5  # damaged answers that are no frame at all
+_TEXT_SHOWN = 24
 _WRONG_CHECKS = 5  # answers, at least
 _SYSTEM_LEAST = 3  # of one kind, before it is a system
 _EXCESS_SPREAD = 2  # octets
@@ -166,11 +168,18 @@ def _damaged(seen: BusRecord, name: str, station: StationRecord, is_common: bool
     if damaged.count >= _NEARLY_ALL_LEAST and 10 * damaged.count >= 9 * station.asked:  # noise leaves some
         means = f"{finding.means}; or two stations with this address, whose answers fall on each other"
         following = f"switch the station off and see whether something still answers; {finding.next}"
-        if not station.answered and 10 * station.garbled >= 9 * damaged.count:  # noise leaves some of it
-            means = f"the device has another baud rate, or speaks another protocol; or {means}"
-            following = f"baud rate, parity and protocol in the device's settings; {following}"
+        finding = replace(finding, means=means, next=following)
+    if _is_nothing_of_this_line(station):
+        means = f"the device has another baud rate, or speaks another protocol; or {finding.means}"
+        following = f"baud rate, parity and protocol in the device's settings; {finding.next}"
         finding = replace(finding, means=means, next=following)
     yield finding
+
+
+def _is_nothing_of_this_line(station: StationRecord) -> bool:
+    """Whether it never answered, and nearly all that came is no frame at all: noise leaves some of it."""
+    count = station.damaged.count
+    return not station.answered and count >= _GARBLED_LEAST and 10 * station.garbled >= 9 * count
 
 
 def _twice(name: str, station: StationRecord, words: str, slow: bool) -> Finding:
@@ -239,6 +248,8 @@ def _foreign(seen: BusRecord, name: str, station: StationRecord) -> Finding | No
         baud = seen.timing.line.baud
         rates = f": about {baud // factor} Bd, not {baud}" if seen.timing.has_rate else ", whose baud rate nobody said"
         words += f"; its bits are {factor} times as long as those of this line{rates}"
+    elif (text := garbage.text()) is not None:
+        words += f"; it is text{f' with 7 data bits and {text[1]} parity' if text[1] else ''}: {_quoted(text[0])}"
     return garbage.tally.found(RULES["MB014"], name, words)
 
 
@@ -246,6 +257,10 @@ def _is_steady(values: Sequence[int]) -> bool:
     """Whether most of them lie close together, as they do when two always begin a little apart."""
     usual = middle(values) if values else 0
     return 3 * sum(abs(value - usual) <= _EXCESS_SPREAD for value in values) >= 2 * len(values) > 0
+
+
+def _quoted(text: str) -> str:
+    return ascii(text[:_TEXT_SHOWN])[1:-1].join("“”") + (" …" if len(text) > _TEXT_SHOWN else "")
 
 
 def _octets(count: int) -> str:

@@ -317,9 +317,11 @@ class ModbusTracker(TrackerMemory):
 
     def _is_damaged_answer(self, request: Exchange, seen: Seen) -> bool:
         """Whether a damaged frame came in answer. One that was cut may have the length of a request by chance: it is
-        an answer all the same when it comes as soon as that station's answers do, which no master does."""
+        an answer all the same when it comes as soon as that station's answers do, which no master does; likewise where
+        it seems to ask a station that nobody ever heard of, on a bus whose answers are heard."""
         if seen.header.role is Role.REQUEST:
-            return seen.unit == request.unit and self._times.is_prompt(request, seen)
+            nobodys = seen.unit not in self._units and self.learnt.fastest(request.unit) is not None
+            return (seen.unit == request.unit or nobodys) and self._times.is_prompt(request, seen)
         if request.is_for(seen.octets) and (request.garble is None or seen.header.role is Role.RESPONSE):
             return True
         return self._times.in_time(request, seen) and not names_another(seen, request.unit, self._units)

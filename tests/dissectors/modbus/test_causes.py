@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
 from dissectors.chances import at_least
 from dissectors.findings import Severity
 from dissectors.frame import Flaw
-from dissectors.modbus.garbage import Garbage, slower_by, whole_runs
+from dissectors.modbus.garbage import Garbage, slower_by, text_of, whole_runs
 from dissectors.modbus.header import peek_rtu
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.text import text
@@ -88,6 +89,42 @@ def test_long_bits_name_the_baud_rate(bus):
     (finding,) = (one for one in findings_of(bus) if one.code == "MB014")
     assert finding.severity is Severity.ERROR
     assert "about 4800 Bd, not 19200" in finding.seen
+
+
+def with_parity(text, odd=0):
+    return bytes(octet | (octet.bit_count() & 1 ^ odd) << 7 for octet in text)
+
+
+@pytest.mark.parametrize(
+    ("sent", "words"),
+    [
+        (bytes, "it is text: “(230.0 49.9 04\\r”"),
+        (with_parity, "it is text with 7 data bits and even parity: “(230.0 49.9 04\\r”"),
+        (partial(with_parity, odd=1), "it is text with 7 data bits and odd parity: “(230.0 49.9 04\\r”"),
+    ],
+)
+def test_text_in_answer_is_another_protocol(bus, sent, words):
+    quiet(bus)
+    for turn in range(5):
+        bus.say(READ, 200).noise(sent(b"(230.0 49.9 %02d\r" % turn))
+    assert graves_of(bus) == {("MB014", "station 1")}
+    assert words in next(one.seen for one in findings_of(bus) if one.code == "MB014")
+
+
+def test_octets_that_are_no_text():
+    assert text_of([b"(230.0 49.9\r"]) is None  # too few
+    assert text_of([bytes(range(64))]) is None
+    assert text_of([with_parity(b"(230.0 49.9 04\r")[:-2] + b"\xa1\xa2\xa4\xa8"] * 3) is None
+    assert text_of([b"(\xb2\xb3\xb0.\xb0 \xb4\xb9.9 \xb04\xad"] * 3) is None  # bit 7 is no parity
+
+
+def test_nothing_that_came_begins_as_an_answer(bus):
+    """A device that sends twice as fast: hardly half of its octets are heard, and other ones each time."""
+    quiet(bus)
+    for turn in range(5):
+        bus.say(READ, 200).noise(bytes((0xE0 + turn, 0x91, 0x0C + turn, 0xF5, 0x83)))
+    (finding,) = (one for one in findings_of(bus) if one.code == "MB005")
+    assert finding.means.startswith("the device has another baud rate, or speaks another protocol; or noise")
 
 
 def test_noise_that_differs_is_no_other_baud_rate():
@@ -252,3 +289,11 @@ def test_frames_torn_by_a_late_read_are_nobodys_damage(bus):
             bus.say(READ).cut(VALUES, 4).say(READ, 60).say(VALUES)
             bus.events[-2] = replace(bus.events[-2], slack=60_000_000)
     assert graves_of(bus) == set()
+
+
+def test_damage_that_seems_to_ask_a_station_nobody_knows_is_a_damaged_answer(bus):
+    quiet(bus)
+    for _ in range(5):
+        bus.say(READ, 200).damage("300100010100", at=5)
+    assert graves_of(bus) == {("MB014", "station 1")}
+    assert not [one for one in findings_of(bus) if one.code in ("MB001", "MB009")]
