@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dissectors.bacnet.frame_types import HEADER, PREAMBLE, is_encoded
+from dissectors.bacnet.frame_types import HEADER, PREAMBLE, data_length, is_encoded, total
 from dissectors.bacnet.header import is_whole_header
 from dissectors.bacnet.mending import WITHOUT_DATA
 from dissectors.bacnet.ring_tally import RingTally
@@ -11,6 +11,7 @@ from dissectors.checksums import crc8_mstp, crc16_x25
 from dissectors.frame import Damage, Flaw, Frame, Header
 
 _CUT = frozenset((Damage.SHORT, Damage.RESTARTED))
+_CHECK = 2  # octets behind the data; without both of them nothing contradicts the data
 _AT_END = frozenset((Flaw.LAST_MISSING, Flaw.LAST_TWO_MISSING))
 
 
@@ -52,6 +53,8 @@ def only_its_end(frame: Frame, speaker: Speaker) -> bool:
     octets = frame.octets
     if frame.damage is Damage.CHECK and not is_encoded(octets[2]):
         return octets[-2] == crc16_x25(octets[HEADER:-2]) & 0xFF
+    if frame.damage in _CUT and is_whole_header(frame) and not is_encoded(octets[2]):
+        return len(octets) > HEADER and total(data_length(octets)) - len(octets) == _CHECK
     if len(octets) < HEADER - 2 or octets[2] not in WITHOUT_DATA:
         return False
     due = bytes((*PREAMBLE, octets[2], speaker.destination or 0, speaker.source, 0, 0))

@@ -202,14 +202,20 @@ def test_answers_that_lack_their_end(cut: int, extended: bool):
     read = script(steps)
     damaged = [event for event in read.events if isinstance(event, Frame) and not event.ok]
     assert len(damaged) == 5
-    if cut == 2 and not extended:  # nothing is left of its check
-        assert read.graves() == {("MS402", "MAC 5")}
+    assert read.graves() == {("MS405", "MAC 5")}
+    if cut == 2 and not extended:  # nothing is left of its check that would put it right
         return
     assert {event.repair.flaw for event in damaged if event.repair} == {
         [Flaw.LAST_MISSING, Flaw.LAST_TWO_MISSING][cut - 1]
     }
     assert all(event.repair and event.repair.octets == answer for event in damaged)
-    assert read.graves() == {("MS405", "MAC 5")}
+
+
+def test_answers_cut_anywhere_do_not_lack_their_end():
+    steps = rounds(5, 2, 5)
+    for lost in (1, 2, 4, 6, 3, 5):
+        steps += [(2, data(2, 5, READ, expects=True)), (20, data(5, 2, VALUE)[:-lost]), *rounds(2, 2, 5)]
+    assert script(steps).graves() == {("MS402", "MAC 5")}
 
 
 def test_noise_that_hits_everybody_is_the_bus():
