@@ -79,13 +79,15 @@ class Timing:
 
     `latency`: ns that adapter and host may hold an octet back (FTDI: latency timer + 1 ms); 0 for exact times.
     `is_told`: whether that is known; else it is what the reads seem to say, and single times may be later still.
-    `has_rate`: whether the baud rate of `line` is the bus's; else it is what such a bus normally runs at.
+    `has_rate`: whether the baud rate of `line` is the bus's; else it is what such a bus normally runs at. `has_times`:
+    whether the capture says when anything came; else its octets are laid one behind the other.
     """
 
     line: LineSettings = LineSettings()
     latency: int = 0
     is_told: bool = True
     has_rate: bool = True
+    has_times: bool = True
 
     @property
     def char(self) -> int:

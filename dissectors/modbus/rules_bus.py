@@ -354,7 +354,7 @@ def _of_late_speakers(seen: BusRecord) -> Iterator[Finding]:
 
 def _cycle(seen: BusRecord) -> Iterator[Finding]:
     usual = seen.cycles.usual()
-    if usual is None or len(usual[2]) < 4:
+    if usual is None or len(usual[2]) < 4 or not seen.timing.has_times:
         return
     unit, key, periods = usual
     low, median, high = (periods[len(periods) * part // 100] for part in (5, 50, 95))

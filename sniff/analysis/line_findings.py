@@ -295,7 +295,8 @@ class LineFindings:
             made += self._wrong_octets()
         made += self._of_bus()
         made += self._patterns.findings()
-        made += self._use.findings()
+        if self._session.has_times:
+            made += self._use.findings()
         return tuple(made)
 
     def _can_tell(self) -> Finding:

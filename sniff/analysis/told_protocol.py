@@ -195,7 +195,7 @@ def _of_characters(session: Session) -> LineSettings | None:
 def _fast_enough(session: Session) -> LineSettings | None:
     """The usual line, or the next faster one that brings as many octets as were read; None when the usual one does."""
     sample, line = session.sample, session.line
-    if len(sample) < 2 or session.adapter.latency_from.endswith("no times"):
+    if len(sample) < 2 or not session.has_times:
         return None
     span = sample[-1].time - sample[0].time + session.adapter.latency
     octets = sum(len(chunk.octets) for chunk in sample[1:])

@@ -171,7 +171,9 @@ def _print(
     if summary.load.first is None or summary.load.last is None:
         _line("content", "no octets" if not summary.searched else "only what was heard while searching for settings")
     else:
-        if session.started < UNDATED:
+        if not session.has_times:
+            _line("times", "none: the file does not say when anything came")
+        elif session.started < UNDATED:
             _line("times", f"{_span(summary.seconds)}; the file has no date")
         else:
             _line("from", iso(summary.load.first))
@@ -187,7 +189,8 @@ def _print(
     _line("reports", f"line errors: {reports}{'; ' + adapter.detail if adapter.detail else ''}")
     searched = f"{summary.searched} of them while searching, " if summary.searched else ""
     octets = summary.octets + summary.searched
-    _line("octets", f"{octets}, {searched}{summary.noise} of them noise; bus load {summary.load.overall():.1%}")
+    load = f"; bus load {summary.load.overall():.1%}" if session.has_times else ""
+    _line("octets", f"{octets}, {searched}{summary.noise} of them noise{load}")
     if foreign is not None:
         many = counted(foreign[1], "frame")
         _line("foreign", f"{many} of {foreign[0].title} among what is none of {dissector_for(session).title}")

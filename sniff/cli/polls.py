@@ -55,7 +55,10 @@ def write(args: argparse.Namespace, polls: Polls, devices: Devices, session: Ses
     end = max((poll.last for poll in held if poll.last is not None), default=0)
     clock = iso if args.style != "text" else _clock
     rows = [
-        _row(poll, asked(poll, devices), told(changes(poll, begin, end), clock), args.style == "text") for poll in held
+        _row(
+            poll, asked(poll, devices), told(changes(poll, begin, end), clock), args.style == "text", session.has_times
+        )
+        for poll in held
     ]
     if args.style != "text":
         tables.write(HEADINGS, rows, args.style)
@@ -69,8 +72,9 @@ def write(args: argparse.Namespace, polls: Polls, devices: Devices, session: Ses
         print(f"and {polls.dropped} requests more, of entries beyond the {len(held)} above")
 
 
-def _row(poll: Poll, asks: str, changed: str, brief: bool) -> tuple[Cell, ...]:
-    key, interval, jitter = poll.key, poll.interval, poll.jitter
+def _row(poll: Poll, asks: str, changed: str, brief: bool, has_times: bool) -> tuple[Cell, ...]:
+    key = poll.key
+    interval, jitter = (poll.interval, poll.jitter) if has_times else (None, None)
     clock = _clock if brief else iso
     return (
         key.source,

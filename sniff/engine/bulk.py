@@ -19,7 +19,7 @@ from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction
 from sniff.engine.blocks import Block
 from sniff.engine.capture import CaptureError
-from sniff.engine.engine import Engine, Output, Row
+from sniff.engine.engine import Engine, Output, Row, without_times
 from sniff.engine.follow_settings import SessionEngine
 from sniff.engine.framing import BulkFraming, Clean, Stretch
 from sniff.engine.gathering import gathered
@@ -244,7 +244,7 @@ class _Leg:
             else:
                 placing.add_run(run, self._before_tx)
                 place = run.end
-        made = placing.table()
+        made = placing.table() if self.timing.has_times else placing.table().without_times()
         self.next += len(made)
         self.last_tx = max(self.last_tx, int(made.placed.tx.max(initial=0)))
         return made
@@ -303,6 +303,8 @@ class _Leg:
     def _numbered(self, closed: tuple[Transaction, ...]) -> list[Transaction]:
         """Transactions with their numbers on the whole bus."""
         before = self._before_tx
+        if not self.timing.has_times:
+            closed = without_times(closed)
         if not before:
             return list(closed)
         return [replace(one, id=one.id + before, of=None if one.of is None else one.of + before) for one in closed]

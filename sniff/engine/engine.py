@@ -66,6 +66,11 @@ def together(outputs: Iterable[Output]) -> Output:
     return Output(tuple(rows), tuple(closed), tuple(closed_by))
 
 
+def without_times(closed: Iterable[Transaction]) -> tuple[Transaction, ...]:
+    """Transactions of a capture that does not say when anything came: how long an answer took, nobody knows."""
+    return tuple(one if one.latency is None else replace(one, latency=None) for one in closed)
+
+
 class Engine:
     """Runs one protocol over one bus.
 
@@ -142,6 +147,8 @@ class Engine:
     def _renumbered(self, closed: tuple[Transaction, ...]) -> tuple[Transaction, ...]:
         """Transactions with their numbers on the whole bus, where another engine has numbered before this one."""
         before = self.before_tx
+        if not self.timing.has_times:
+            closed = without_times(closed)
         if not before:
             return closed
         return tuple(replace(one, id=one.id + before, of=None if one.of is None else one.of + before) for one in closed)

@@ -61,6 +61,9 @@ SECOND_NOTE = "second protocol"
 INFERRED = "inferred from the reads"
 """Where a latency is from that nobody said."""
 
+NO_TIMES = "assumed; the log has no times"
+"""Where the latency of a capture is from that says of nothing when it came."""
+
 UNNAMED = ("assumed", "unknown", "")
 """What `latency_from` is when nobody knows the adapter."""
 
@@ -137,7 +140,12 @@ class Session:
         """The line with what the adapter allows."""
         latency, said_by = self.adapter.latency, self.adapter.latency_from
         is_told = said_by not in UNNAMED and not said_by.startswith(INFERRED)
-        return Timing(self.line, latency, is_told, has_rate=not self.line_is_assumed)
+        return Timing(self.line, latency, is_told, not self.line_is_assumed, self.has_times)
+
+    @property
+    def has_times(self) -> bool:
+        """Whether the capture says when anything came; where not, its octets are laid one behind the other."""
+        return self.adapter.latency_from != NO_TIMES
 
     def found(self, line: LineSettings | None, protocol: str | None) -> Session:
         """The session once its search has ended with these settings."""

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING
 from dissectors.frame import Chunk
 from dissectors.line import MS
 from sniff.engine.capture import CaptureError
-from sniff.engine.session import Adapter, Completeness, Item, LineEvent, Session
+from sniff.engine.session import NO_TIMES, Adapter, Completeness, Item, LineEvent, Session
 from sniff.formats.contents import utf16_of
 from sniff.formats.files import explain, open_capture
 from sniff.formats.log_assembly import LINE_END, SLOW, Assembly
@@ -156,7 +156,7 @@ class ByteLog:
         stamps = [line.stamp for line in read if line.stamp is not None]
         if not stamps:
             longest = LINE_END + max((len(line.octets) for line in read), default=0) * SLOW.char
-            return replace(adapter, latency=max(TIMELESS, longest), latency_from="assumed; the log has no times")
+            return replace(adapter, latency=max(TIMELESS, longest), latency_from=NO_TIMES)
         tick = min(stamp.tick for stamp in stamps)
         if tick <= FOREIGN_LATENCY:
             return adapter

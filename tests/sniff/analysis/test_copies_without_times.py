@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -10,6 +12,7 @@ import pytest
 from dissectors.findings import Finding, Severity
 from dissectors.modbus.envelope import seal_rtu
 from sniff.analysis.told_protocol import detected
+from sniff.cli import main
 from sniff.engine.session import with_settings
 from sniff.formats import read
 from tests.faults.judged import findings_of
@@ -58,3 +61,19 @@ def test_no_rate_is_told_of_a_line_whose_own_rate_nobody_said(tmp_path: Path) ->
     said = findings(tmp_path / "x.log", [frame for one in READ for frame in (one, SLOWER)])
     assert "4 times as long as those of this line, whose baud rate nobody said" in said["MB014"].seen
     assert " Bd" not in said["MB014"].seen + said["LN204"].seen
+
+
+def test_a_log_without_times_says_nothing_of_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "x.log"
+    said = findings(path, [frame for pair in zip(READ * 2, VALUE * 2, strict=True) for frame in pair])
+    assert set(said) <= {"LN001", "MB303"}
+    for reference in ([], ["--reference"]):
+        assert main(["show", str(path), "--json", *reference]) == 0
+        assert '"latency_ms": null' in (shown := capsys.readouterr().out)
+        assert '"latency_ms": null' * shown.count("\n") == "".join(re.findall('"latency_ms": [^,]*', shown))
+        assert main(["info", str(path), *reference]) == 0
+        assert "response" not in (told := capsys.readouterr().out)
+        assert "bus load" not in told
+        assert "times        none: the file does not say when anything came" in told
+        assert main(["stats", str(path), "polls", "--json", *reference]) == 0
+        assert all(one["every ms"] is None for one in map(json.loads, capsys.readouterr().out.splitlines()))
