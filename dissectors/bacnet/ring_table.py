@@ -35,6 +35,9 @@ HEADINGS = (
 )
 
 
+_SHARES = (0.5, 0.95, 1)
+
+
 def rows(ring: Ring) -> list[tuple[Cell, ...]]:
     """One row a master, in the order of the ring, then those outside it by address."""
     order = ring.order
@@ -47,20 +50,18 @@ def _row(ring: Ring, mac: int, following: int | None) -> tuple[Cell, ...]:
     from dissectors.bacnet.ring import RingEventKind  # a bus of which nobody asks for the ring has none
 
     node = ring.nodes[mac]
+    times = (
+        _ms(node.loop, 0.5),
+        _ms(node.loop, 1),
+        *(_ms(which, share) for which in (node.use, node.reply) for share in _SHARES),
+    )
     return (
         mac,
         following,
         node.tokens_sent,
         sum(edge.retries for (source, _), edge in ring.edges.items() if source == mac),
         ring.of(RingEventKind.LOST_TOKEN, mac).count,
-        _ms(node.loop, 0.5),
-        _ms(node.loop, 1),
-        _ms(node.use, 0.5),
-        _ms(node.use, 0.95),
-        _ms(node.use, 1),
-        _ms(node.reply, 0.5),
-        _ms(node.reply, 0.95),
-        _ms(node.reply, 1),
+        *(times if ring.timing.has_times else (None,) * len(times)),
         node.postponed,
         node.most_in_a_hold,
         node.polls_unanswered,
@@ -72,8 +73,15 @@ def _row(ring: Ring, mac: int, following: int | None) -> tuple[Cell, ...]:
 def sentences(ring: Ring) -> list[str]:
     """The ring as a whole: order, loop time, waste, what cannot be judged, what happened, advice."""
     order = ring.order
-    said = [
-        f"ring of {len(order)}: {' → '.join(map(str, (*order, order[0])))}" if order else "no closed ring seen",
+    said = [f"ring of {len(order)}: {' → '.join(map(str, (*order, order[0])))}" if order else "no closed ring seen"]
+    if not ring.timing.has_times:
+        return [
+            *said,
+            f"{counted(ring.frames, 'frame')}; when they came is not known",
+            *_happened(ring),
+            *ring.advice(),
+        ]
+    said += [
         f"{ring.frames} frames in {ring.span / 1e9:.1f} s; bus load {ring.load:.1%}",
         f"unanswered polls for masters take {ring.poll_waste_share:.1%} of the time",
     ]
@@ -88,11 +96,14 @@ def sentences(ring: Ring) -> list[str]:
         for name, possible in ring.limits.items()
         if not possible
     ]
+    return said + _happened(ring) + list(ring.advice())
+
+
+def _happened(ring: Ring) -> list[str]:
     counts: dict[RingEventKind, int] = {}
     for (what, _), happened in ring.happened.items():
         counts[what] = counts.get(what, 0) + happened.count
-    said += [f"{count} × {what.value}" for what, count in counts.items() if count]
-    return said + list(ring.advice())
+    return [f"{count} × {what.value}" for what, count in counts.items() if count]
 
 
 def _users(ring: Ring) -> list[str]:

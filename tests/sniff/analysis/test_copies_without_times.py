@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from dissectors.bacnet.envelope import frame
 from dissectors.findings import Finding, Severity
 from dissectors.modbus.envelope import seal_rtu
 from sniff.analysis.told_protocol import detected
@@ -24,7 +25,7 @@ SLOWER = bytes.fromhex("00788080780078787880788078 80F8 00".replace(" ", ""))
 
 
 def findings(path: Path, frames: Iterable[bytes], clock: str = "") -> dict[str, Finding]:
-    path.write_text("".join(f"{clock}{frame.hex(' ')}\n" for frame in frames))
+    path.write_text("".join(f"{clock}{one.hex(' ')}\n" for one in frames))
     log = read(path)
     session = with_settings(detected(log.session), "modbus-rtu")
     return {one.code: one for one in findings_of(session, log.items())}
@@ -43,7 +44,7 @@ def test_requests_again_that_nobody_answers_are_not_called_an_echo(tmp_path: Pat
 
 
 def test_answers_behind_copies_show_an_echo(tmp_path: Path, clock: str) -> None:
-    frames = [frame for pair in zip(READ, READ, VALUE, strict=True) for frame in pair]
+    frames = [said for pair in zip(READ, READ, VALUE, strict=True) for said in pair]
     said = findings(tmp_path / "x.log", frames, clock)
     assert said["LN205"].severity is Severity.WARNING
     assert said["LN205"].seen == "8 of 8 requests came twice, the copy directly behind"
@@ -58,14 +59,14 @@ def test_repeats_within_one_second_do_not_tell_how_long_the_master_waits(tmp_pat
 
 
 def test_no_rate_is_told_of_a_line_whose_own_rate_nobody_said(tmp_path: Path) -> None:
-    said = findings(tmp_path / "x.log", [frame for one in READ for frame in (one, SLOWER)])
+    said = findings(tmp_path / "x.log", [said for one in READ for said in (one, SLOWER)])
     assert "4 times as long as those of this line, whose baud rate nobody said" in said["MB014"].seen
     assert " Bd" not in said["MB014"].seen + said["LN204"].seen
 
 
 def test_a_log_without_times_says_nothing_of_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "x.log"
-    said = findings(path, [frame for pair in zip(READ * 2, VALUE * 2, strict=True) for frame in pair])
+    said = findings(path, [said for pair in zip(READ * 2, VALUE * 2, strict=True) for said in pair])
     assert set(said) <= {"LN001", "MB303"}
     for reference in ([], ["--reference"]):
         assert main(["show", str(path), "--json", *reference]) == 0
@@ -77,3 +78,14 @@ def test_a_log_without_times_says_nothing_of_time(tmp_path: Path, capsys: pytest
         assert "times        none: the file does not say when anything came" in told
         assert main(["stats", str(path), "polls", "--json", *reference]) == 0
         assert all(one["every ms"] is None for one in map(json.loads, capsys.readouterr().out.splitlines()))
+
+
+def test_a_ring_without_times_has_no_rounds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "x.log"
+    round_ = [frame(0, following, mac) for mac, following in ((1, 3), (3, 7), (7, 1))]
+    path.write_text("".join(f"{one.hex(' ')}\n" for one in round_ * 20))
+    assert main(["stats", str(path), "ring", "-p", "mstp"]) == 0
+    said = capsys.readouterr().out
+    assert "60 frames; when they came is not known" in said
+    assert "load" not in said
+    assert all(line.split()[5:13] == ["–"] * 8 for line in said.splitlines()[1:4])
