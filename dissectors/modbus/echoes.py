@@ -26,15 +26,15 @@ _GAPS_KEPT = 8
 class Echoes:
     """What is known of echoes on one bus.
 
-    `silence`: ns, the shortest time in which a station can begin an answer. `limit`: ns, within which a copy is no
+    `soonest`: ns, the shortest time in which a station can begin an answer. `limit`: ns, within which a copy is no
     answer. `usual`: whether this bus repeats requests at once; None while unlearnt.
     """
 
-    def __init__(self, timing: Timing, silence: int, learnt: LearnedTiming) -> None:
+    def __init__(self, timing: Timing, soonest: int, learnt: LearnedTiming) -> None:
         self._timing = timing
-        self._silence = silence
+        self._soonest = soonest
         self._learnt = learnt
-        self.limit = max(silence, timing.char + timing.latency)
+        self.limit = max(soonest, timing.char + timing.latency)
         self.usual: bool | None = None
         self._votes = 0  # answered requests with an echo, less those without
         self._gaps: deque[int] = deque(maxlen=_GAPS_KEPT)  # before the newest echoes of requests that are surely some
@@ -59,7 +59,7 @@ class Echoes:
             return self.usual
         if not latency.nominal:
             return False  # both came in one read, which says nothing of the time between
-        if latency.high < self._silence:
+        if latency.high < self._soonest:
             return True
         fastest = self._learnt.fastest(request.unit)
         return fastest is not None and latency.nominal + self._timing.char < fastest // 2
@@ -69,7 +69,7 @@ class Echoes:
         answer: nothing has told yet whether this bus has echoes, and the adapter leaves open that it came at once."""
         if self.usual is not None or request.copied is None or request.octets != seen.octets:
             return False
-        return request.copied < self._silence + max(self._learnt.margin, seen.frame.slack)
+        return request.copied < self._soonest + max(self._learnt.margin, seen.frame.slack)
 
     def owes_answer(self, request: Exchange, seen: Seen) -> bool:
         """Whether the copy that was taken for the answer to a request was its echo, as this bus has one of each, and

@@ -21,12 +21,14 @@ def has_no_layout(seen: Seen) -> bool:
 
 
 class Promptness:
-    """Compares times with what was learnt. `silence`: ns, the shortest time in which a station can begin an answer;
-    `latency`: ns that the adapter holds octets back, which is in all that was learnt."""
+    """Compares times with what was learnt. `silence`: ns, the shortest time after which somebody else may speak;
+    `latency`: ns that the adapter holds octets back, which is in all that was learnt; `soonest`: ns, in which a station
+    can begin an answer, allowed or not."""
 
-    def __init__(self, learnt: LearnedTiming, silence: int, latency: int) -> None:
+    def __init__(self, learnt: LearnedTiming, silence: int, latency: int, soonest: int) -> None:
         self._learnt = learnt
         self._silence = silence
+        self._soonest = soonest
         self._latency = latency
 
     def in_time(self, request: Exchange, seen: Seen) -> bool:
@@ -56,8 +58,7 @@ class Promptness:
 
     def is_too_soon(self, request: Exchange, seen: Seen) -> bool:
         """Whether it began before the station can have seen the end of this repeat: it answers an earlier attempt."""
-        soonest = request.latency(seen.frame).high
-        return request.attempt > 1 and soonest < self._silence
+        return request.attempt > 1 and request.latency(seen.frame).high < self._soonest
 
     def is_repeat_after_damage(self, request: Exchange, seen: Seen, echoing: bool | None) -> bool:
         """Whether a copy of a request comes well behind a damaged answer to it, with no learnt time that would make it

@@ -181,7 +181,7 @@ class ModbusTracker(TrackerMemory):
         if before is not None:
             request.disturbed = True
             return self._answer_apart(seen, Verdict.ANSWERED_TWICE, before)
-        if request.latency(seen.frame).high < self._silence:
+        if request.latency(seen.frame).high < self._soonest:
             return self._from_elsewhere(request, seen)
         return self._answer(request, seen, another_function(request.octets, seen.octets))
 

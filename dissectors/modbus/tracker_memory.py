@@ -39,10 +39,15 @@ class PassedBy:
     units: set[int]
 
 
+QUICK = 4_000_000
+"""ns. Stations that count the octets of a request do not wait for 3.5 characters of silence, which are long at low
+rates: many answer after a time that is always the same. What gives octets back is one character behind at most."""
+
+
 class TrackerMemory:
     """What a tracker knows.
 
-    `silence`: ns, the shortest time in which a station can begin an answer; 3.5 characters where not given (RTU).
+    `silence`: ns, the shortest time after which a station may begin an answer; 3.5 characters where not given (RTU).
     `learnt`: what the traffic so far told of response times, timeout and pauses.
     """
 
@@ -50,8 +55,9 @@ class TrackerMemory:
         self.learnt = LearnedTiming(timing)
         self._timing = timing
         self._silence = 7 * timing.char // 2 if silence is None else silence
-        self._times = Promptness(self.learnt, self._silence, timing.latency)
-        self._echoes = Echoes(timing, self._silence, self.learnt)
+        self._soonest = min(self._silence, max(timing.char, QUICK))
+        self._times = Promptness(self.learnt, self._silence, timing.latency, self._soonest)
+        self._echoes = Echoes(timing, self._soonest, self.learnt)
         self._held = Exchanges(self.learnt, self._echoes)
         self._odd = OddAnswers(self._times, self._held)
         self._last_end: int | None = None  # of the newest frame
