@@ -272,7 +272,8 @@ class ModbusTracker(TrackerMemory):
         if last is not None and self._echoes.owes_answer(last, seen) and self._times.in_time(last, seen):
             return self._answer_behind_echo(last, seen)
         gap = 0 if self._last_end is None else max(0, seen.frame.start - self._last_end)
-        too_soon = gap < self.learnt.too_soon(self._silence) and not self._may_be_next(gap, seen)
+        is_timed = self._timing.has_times  # else nothing comes too soon
+        too_soon = is_timed and gap < self.learnt.too_soon(self._silence) and not self._may_be_next(gap, seen)
         if last is not None and last.octets == seen.octets and too_soon:
             if last.answered and self._held.goes_on(seen):
                 return self._request(seen, sure=False)

@@ -11,6 +11,7 @@ import pytest
 
 from dissectors.bacnet.envelope import frame
 from dissectors.findings import Finding, Severity
+from dissectors.line import LineSettings
 from dissectors.modbus.envelope import seal_rtu
 from sniff.analysis.told_protocol import detected
 from sniff.cli import main
@@ -24,10 +25,10 @@ SLOWER = bytes.fromhex("00788080780078787880788078 80F8 00".replace(" ", ""))
 """What 9600 Bd makes of seven characters at 2400 Bd, but for one bit."""
 
 
-def findings(path: Path, frames: Iterable[bytes], clock: str = "") -> dict[str, Finding]:
+def findings(path: Path, frames: Iterable[bytes], clock: str = "", line: str = "") -> dict[str, Finding]:
     path.write_text("".join(f"{clock}{one.hex(' ')}\n" for one in frames))
     log = read(path)
-    session = with_settings(detected(log.session), "modbus-rtu")
+    session = with_settings(detected(log.session), "modbus-rtu", LineSettings.parse(line) if line else None)
     return {one.code: one for one in findings_of(session, log.items())}
 
 
@@ -89,3 +90,11 @@ def test_a_ring_without_times_has_no_rounds(tmp_path: Path, capsys: pytest.Captu
     assert "60 frames; when they came is not known" in said
     assert "load" not in said
     assert all(line.split()[5:13] == ["–"] * 8 for line in said.splitlines()[1:4])
+
+
+def test_nothing_comes_too_soon_where_nobody_knows_when_it_came(tmp_path: Path) -> None:
+    """At 1200 Bd lines of a log lie closer together than a station may answer."""
+    asked, answered = seal_rtu(b"\1\x64\1\2"), seal_rtu(b"\1\x64\t\t\t\t\t")
+    assert set(findings(tmp_path / "x.log", [asked, answered] * 10, line="1200,8N1")) <= {"LN001", "MB303"}
+    write = seal_rtu(b"\1\6\0\1\0\2")
+    assert "MB201" not in findings(tmp_path / "x.log", [*READ[:1], *VALUE[:1], write, write, write] * 5)
