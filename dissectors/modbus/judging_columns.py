@@ -87,8 +87,7 @@ class _Judging:
         seen.first = int(frames.start[stretch.start]) if seen.first is None else seen.first
         seen.now = max(seen.now, int(frames.end[stretch].max()))
         late = np.flatnonzero(slack > judge.timing.latency + MS)
-        if len(late):
-            judge.late_read = rows.first + stretch.start + int(late[-1])
+        judge.late.add((rows.first + stretch.start + late).tolist())
         size = np.maximum(frames.length[stretch], frames.expected[stretch])
         request, answered = found.request[which] - stretch.start, found.answered[which]
         seen.requests += len(request)

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from dissectors.checksums import crc16_modbus
 from dissectors.findings import ExceptionWords, Finding, Tally
 from dissectors.frame import Damage, Flaw, Frame, Role
 from dissectors.line import MS
 from dissectors.modbus.asked import AskedRequest
 from dissectors.modbus.envelope import RTU_NAME, rtu_check
-from dissectors.modbus.functions import COPIED, EXCEPTION_BIT, FUNCTIONS, answer_length
+from dissectors.modbus.functions import COPIED, EXCEPTION_BIT, FUNCTIONS
 from dissectors.modbus.learned_timing import READ
 from dissectors.modbus.limits import ILLEGAL, beyond_limits
 from dissectors.modbus.pairing import is_answer
@@ -23,12 +22,12 @@ from dissectors.modbus.response_groups import AnsweredRequest
 from dissectors.modbus.row_observer import AT_ONCE, STRAY_KEPT, RowObserver
 from dissectors.modbus.rules_bus import judge
 from dissectors.modbus.station_record import Lost, StationRecord
+from dissectors.modbus.wrong_ends import ends_badly, excess_of
 from dissectors.tracker import Transaction, Verdict
 
 _NO_WAIT = 10 * MS  # no master gives up so soon: it does not wait for one answer before it asks for the next
 _EXCESS_KEPT = 256
 _WORDS_KEPT = 16
-_TALKED_OVER = 3  # octets by which an answer must be too long before somebody else has spoken
 _MAY_BE_TORN = (Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST, Verdict.NO_RESPONSE)
 _SETTLED_ELSEWHERE = (Verdict.ECHO, Verdict.DATA, Verdict.OPEN, Verdict.BROADCAST)
 
@@ -59,8 +58,7 @@ class ModbusFindings(RowObserver):
             if verdict is Verdict.BROADCAST and asked is not None:
                 self.seen.cycles.add(asked.octets, asked.key, transaction.start)
             return
-        damaged = verdict in (Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST)
-        if damaged and self.late_read >= (transaction.request or transaction.response or 0):
+        if verdict in (Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST) and self._came_late(transaction):
             return  # a frame was torn by a late read, not spoilt
         if self._is_torn(transaction, asked):
             return
@@ -114,11 +112,17 @@ class ModbusFindings(RowObserver):
             if damaged:
                 self._settle_damaged(station, transaction, asked, stray, flaw)
 
+    def _came_late(self, transaction: Transaction) -> bool:
+        """Whether a row of it, or the next one, came in a late read; behind a request noise that came in answer."""
+        request, response = transaction.request or transaction.response or 0, transaction.response or 0
+        is_noise = not response and transaction.verdict is Verdict.DAMAGED_ANSWER
+        return self.late.among(request, max(request, response) + 1 + is_noise)
+
     def _may_be_next_request(self, transaction: Transaction, answer: bytes) -> bool:
         """Whether a second answer may be the master's next request, the same again: it, or the frame before it, was
         read too late to say how long the master paused."""
         row = transaction.response
-        if row is None or self.late_read < row - 1 or len(answer) < 2 or answer[1] & EXCEPTION_BIT:
+        if row is None or not self.late.among(row - 1, row) or len(answer) < 2 or answer[1] & EXCEPTION_BIT:
             return False
         return answer[1] in COPIED or answer[1] not in FUNCTIONS
 
@@ -157,7 +161,7 @@ class ModbusFindings(RowObserver):
         check = rtu_check(frame) if frame.protocol == RTU_NAME and frame.damage is Damage.CHECK else None
         if check is not None and not frame.marks:
             station.wrong_check(check[0] ^ check[1], len(frame.octets)).add(frame.end, no, check[1])
-        if _ends_badly(frame):
+        if ends_badly(frame):
             station.last_octet.add(frame.end, no)
 
     def _settle_unasked(self, transaction: Transaction, ended: tuple[int, int, Frame] | None) -> None:
@@ -251,7 +255,7 @@ class ModbusFindings(RowObserver):
             station.damaged.add(transaction.end, transaction.request, transaction.response)
             station.garbled += transaction.response is None
             return
-        if not asked.header.ok and self.late_read < asked.no and not self.torn.is_torn(transaction.id):
+        if not asked.header.ok and not self._came_late(transaction) and not self.torn.is_torn(transaction.id):
             self.seen.damaged_here.add(transaction.start, transaction.request)
         self.seen.strikes.whole()
         self.seen.late_speakers.answered(asked.unit, f"station {asked.unit}", transaction.start)
@@ -344,7 +348,7 @@ class ModbusFindings(RowObserver):
             stray,
             transaction.start,
             *(transaction.request, transaction.response),
-            is_longer=_excess(asked, stray) is not None,
+            is_longer=excess_of(asked, stray) is not None,
         )
 
     def _settle_damaged(
@@ -362,7 +366,7 @@ class ModbusFindings(RowObserver):
         begins = stray[:1] == (b":" if station.garbage.of_text else asked.octets[:1])
         frames, marked = (transaction.request, transaction.response), transaction.id in self.marked
         station.garbage.add(stray, transaction.end, *frames, is_marked=marked, begins=begins)
-        excess = _excess(asked, stray)
+        excess = excess_of(asked, stray)
         if excess is not None and self._outlasts(transaction, asked):
             station.outlasting.add(transaction.end, transaction.request, transaction.response)
         elif excess is not None:
@@ -374,27 +378,3 @@ class ModbusFindings(RowObserver):
         """Whether what came was not over when the master gave up: it is the master that spoke into it."""
         timeout = self.learnt.timeout
         return timeout is not None and transaction.end - asked.frame.end > timeout - self.timing.latency
-
-
-def _excess(asked: AskedRequest, stray: bytes) -> int | None:
-    """By how many octets what came is too long, where it began as the answer; None where it did not, or is not."""
-    if asked.frame.protocol != RTU_NAME or stray[:2] != asked.octets[:2] or stray[1] not in FUNCTIONS:
-        return None
-    expected = answer_length(asked.frame.octets)
-    excess = len(stray) - expected if expected is not None else 0
-    return excess if excess >= _TALKED_OVER else None
-
-
-def _ends_badly(frame: Frame) -> bool:
-    """Whether a damaged frame is right up to its last octet, or ends just before it."""
-    if frame.damage is Damage.SHORT:
-        if frame.expected is None or frame.expected - len(frame.octets) != 1:
-            return False
-        # an octet lost further in leaves a wrong check
-        return frame.protocol != RTU_NAME or frame.octets[-1] == crc16_modbus(frame.octets[:-1]) & 0xFF
-    if frame.damage is not Damage.CHECK:
-        return False
-    if frame.marks:
-        return all(mark.offset == len(frame.octets) - 1 for mark in frame.marks)
-    check = rtu_check(frame) if frame.protocol == RTU_NAME else None
-    return check is not None and check[0] >> 8 == check[1] >> 8

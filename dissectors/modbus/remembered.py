@@ -10,6 +10,7 @@ from dissectors.modbus.asked import AskedRequest
 from dissectors.modbus.bare_ends import BareEnds
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.gaps import Gaps
+from dissectors.modbus.late_rows import LateRows
 from dissectors.modbus.learned_timing import LearnedTiming
 from dissectors.modbus.long_silences import LongSilences
 from dissectors.modbus.station_record import Lost, StationRecord
@@ -59,7 +60,7 @@ class Remembered:
         self.stray: dict[int, bytes] = {}  # octets that are no good frame, by the transaction they came in
         self.lost: dict[int, Lost] = {}  # requests without answer, by transaction
         self.begins: set[bytes] = set()  # the first octets of good requests
-        self.late_read = 0  # the newest frame that was read later than the adapter explains
+        self.late = LateRows()
         self.torn = TornFrames()
         self.bad_ends: dict[int, tuple[int, int, Frame]] = {}  # damaged answers (station, row), by transaction
         self.marked: deque[int] = deque(maxlen=64)  # transactions with line errors in what came in answer

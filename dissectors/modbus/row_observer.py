@@ -55,7 +55,7 @@ class RowObserver(Remembered):
             self.ends.hear_noise(event)
             return
         if event.slack > self.timing.latency + MS:
-            self.late_read = no
+            self.late.add((no,))
         octets = readable_adu(event)
         if not header.ok:
             self._see_broken(no, event, octets)
