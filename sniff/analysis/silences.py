@@ -33,7 +33,7 @@ class Silences:
         self._rows = 0
         self._gaps = Histogram()
         self._silences: list[tuple[int, int, int]] = []  # begin, end, rows before
-        self._hole = False
+        self._hole: int | None = None  # ns; no row has ended since
         self._asked = False  # the newest row is a request
 
     def see(self, event: Event, asks: bool) -> None:
@@ -44,7 +44,8 @@ class Silences:
             gap = max(0, event.start - self.now)
             self._gaps.add(gap)
             self._see_gap(gap, self._asked, (self.now, event.start, self._rows))
-        self._hole = False
+        if self._hole is not None and event.end >= self._hole:  # else it is what the hole ended
+            self._hole = None
         self.now = max(self.now, event.end)
         self._asked = asks
         self._rows += 1
@@ -58,20 +59,22 @@ class Silences:
         self._gaps.add_many(gaps)
         for place in np.flatnonzero(gaps >= SILENT_LEAST).tolist():
             asked = bool(asks[place - 1]) if place else self._asked
-            self._hole = self._hole and not place
+            if self._hole is not None and (ends[:place] >= self._hole).any():
+                self._hole = None
             self._see_gap(int(gaps[place]), asked, (int(before[place]), int(starts[place]), self._rows + place))
-        self._hole = False
+        if self._hole is not None and int(ends.max()) >= self._hole:
+            self._hole = None
         self.now = max(self.now, int(ends.max()))
         self._asked = bool(asks[-1])
         self._rows += len(starts)
 
-    def miss(self) -> None:
-        """Octets may be lost: over a hole nothing is known."""
-        self._hole = True
+    def miss(self, time: int) -> None:
+        """Octets may be lost at `time`, ns: over a hole nothing is known. Rows that it ended may still come."""
+        self._hole = time
 
     def _see_gap(self, gap: int, asked: bool, silence: tuple[int, int, int]) -> None:
         long = gap >= (SILENT_WAITING if asked else SILENT_LEAST)
-        if long and not self._hole and len(self._silences) < 20 * SILENT_KEPT:
+        if long and self._hole is None and len(self._silences) < 20 * SILENT_KEPT:
             self._silences.append(silence)
 
     def whole(self) -> list[tuple[int, int, int]]:

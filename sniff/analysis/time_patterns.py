@@ -196,7 +196,7 @@ class TimePatterns:
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line: over a hole nothing is known."""
         if event.kind.is_hole:
-            self._silences.miss()
+            self._silences.miss(event.time)
 
     def _step(self, moment: int, is_trouble: bool) -> bool:
         """Measure a moment against the trouble before it; whether it is one of its own."""

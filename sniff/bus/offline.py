@@ -25,15 +25,18 @@ Given = TypeVar("Given", covariant=True)
 
 
 def outputs(items: Iterable[Item], session: Session) -> Iterator[Output | LineEvent]:
-    """Run items through a new engine; line events pass through at their place. Raises CaptureError as `items` does,
-    when all that was whole before the damage has been given."""
+    """Run items through a new engine; line events pass through at their place, a hole before what it ends. Raises
+    CaptureError as `items` does, when all that was whole before the damage has been given."""
     engine = SessionEngine(session)
     try:
         for item in items:
+            hole = item if isinstance(item, LineEvent) and item.kind.is_hole else None
+            if hole is not None:
+                yield hole
             output = engine.take(item)
             if output:
                 yield output
-            if isinstance(item, LineEvent):
+            if isinstance(item, LineEvent) and hole is None:
                 yield item
     except CaptureError:
         yield engine.close()

@@ -134,8 +134,10 @@ def _write_blocks(
         if engine is not None:
             table = engine.take(item)
             for taker in takers:
+                if isinstance(item, LineEvent) and item.kind.is_hole:  # before what it ends
+                    taker.add_line_event(item)
                 taker.add_table(table)
-                if isinstance(item, LineEvent):
+                if isinstance(item, LineEvent) and not item.kind.is_hole:
                     taker.add_line_event(item)
     if engine is not None:
         table = engine.close()
@@ -163,8 +165,10 @@ def _write_items(
         if engine is not None:
             output = engine.take(item)
             for taker in takers:
+                if isinstance(item, LineEvent) and item.kind.is_hole:  # before what it ends
+                    taker.add_line_event(item)
                 taker.add(output)
-                if isinstance(item, LineEvent):
+                if isinstance(item, LineEvent) and not item.kind.is_hole:
                     taker.add_line_event(item)
     if engine is not None:
         output = engine.close()

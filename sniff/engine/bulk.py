@@ -38,15 +38,18 @@ MANY = 64
 
 
 def tables(blocks: Iterable[Block | LineEvent], session: Session) -> Iterator[Table | LineEvent]:
-    """What a capture holds, as tables; line events pass through at their place. Raises what `blocks` raises, and
-    registry.UnknownProtocol."""
+    """What a capture holds, as tables; line events pass through at their place, a hole before what it ends. Raises what
+    `blocks` raises, and registry.UnknownProtocol."""
     engine = BulkEngine(session)
     try:
         for item in blocks:
+            hole = item if isinstance(item, LineEvent) and item.kind.is_hole else None
+            if hole is not None:
+                yield hole
             table = engine.take(item)
             if table:
                 yield table
-            if isinstance(item, LineEvent):
+            if isinstance(item, LineEvent) and hole is None:
                 yield item
     except CaptureError:
         yield engine.close()

@@ -40,6 +40,7 @@ class FrameLog:
         self._heard = -FAR
         self._made: list[tuple[int, int, bytes]] = []
         self._all_rows = self._closed = self._octets = self._events = 0
+        self._is_over = False  # a hole ends what was framed: the next table is the end of a stretch
 
     def hear(self, time: int) -> None:
         """A read came, ns; before what is found in it."""
@@ -65,16 +66,18 @@ class FrameLog:
         if table:
             self._tables.append(table)
             self._rows += len(table)
-        if self._rows >= AT_ONCE:
+        if self._rows >= AT_ONCE or self._is_over:
             self._make()
+        self._is_over = False
 
     def add_line_event(self, event: LineEvent) -> None:
-        """What happened on the line, after the rows before it."""
+        """What happened on the line, after the rows before it; a hole before those that it ends."""
         if settings_change(event) is not None:
             self.fits = False
         self._gather()
         self._make()
         self._events += 1
+        self._is_over = event.kind.is_hole
 
     def close(self) -> None:
         """Nothing more comes."""

@@ -57,8 +57,11 @@ def keep(capture: Capture, path: Path, session: Session | None = None, *, by_row
                 (writer.write if isinstance(part, LineEvent) else writer.write_block)(part)  # type: ignore[arg-type]
                 if not isinstance(part, LineEvent):
                     log.hear_many(part.reads.times)
+                is_hole = isinstance(part, LineEvent) and part.kind.is_hole
+                if isinstance(part, LineEvent) and is_hole:
+                    log.add_line_event(part)
                 log.add_table(engine.take(part))
-                if isinstance(part, LineEvent):
+                if isinstance(part, LineEvent) and not is_hole:
                     log.add_line_event(part)
             log.add_table(engine.close())
         log.close()

@@ -1,0 +1,35 @@
+"""Silences of a bus: over a hole nothing is known, whenever the rows that it ended are told of."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dissectors.frame import Noise, Place, Reason
+from dissectors.line import NS_PER_S
+from sniff.analysis.silences import Silences
+
+MS = NS_PER_S // 1000
+EVERY = 100 * MS
+
+
+def _row(silences: Silences, begin: int, by_columns: bool) -> None:
+    if by_columns:
+        silences.take(np.array([begin]), np.array([begin + MS]), np.array([False]))
+    else:
+        silences.see(Noise(b"1", begin, begin + MS, Place.BETWEEN, Reason.NO_FRAME), False)
+
+
+@pytest.mark.parametrize("by_columns", [False, True])
+@pytest.mark.parametrize("is_hole", [False, True])
+def test_rows_that_a_hole_ended_do_not_close_it(is_hole: bool, by_columns: bool) -> None:
+    silences = Silences()
+    _row(silences, 0, False)
+    for number in range(1, 100):
+        _row(silences, number * EVERY, by_columns)
+    if is_hole:
+        silences.miss(99 * EVERY + 50 * MS)
+    _row(silences, 99 * EVERY + 20 * MS, by_columns)  # ended by it, and told of later
+    for number in range(100):
+        _row(silences, 60 * NS_PER_S + number * EVERY, by_columns)
+    assert bool(silences.whole()) != is_hole
