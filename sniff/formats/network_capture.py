@@ -19,10 +19,11 @@ from dissectors.line import LineSettings, Timing
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.session import Adapter, Completeness, Item, LineEvent, LineEventKind, Session
 from sniff.formats import telnet
-from sniff.formats.network import NETWORK, Address, Segment, Snap, carried, shown
-from sniff.formats.records import FOREIGN_LATENCY, PacketRecord, foreign_session
+from sniff.formats.network import Address, Segment, Snap, shown
+from sniff.formats.network_packets import carried_by
+from sniff.formats.records import FOREIGN_LATENCY, NOT_KEPT, PacketRecord, foreign_session
 from sniff.formats.several_buses import one_or_several
-from sniff.formats.tcp_stream import TcpStream
+from sniff.formats.tcp_order import Said, TcpOrder
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
@@ -105,8 +106,7 @@ def _of_hosts(file: RecordFile) -> dict[str, int]:
     """Protocols whose frames are datagrams among all hosts, with the time of the first; told by their first octets."""
     samples: dict[str, list[Chunk]] = {}
     left = dict.fromkeys(_by_datagram(), SAMPLE)
-    for record in file.records():
-        segment = carried(record.link_type, record.data) if record.link_type in NETWORK else None
+    for record, segment in carried_by(file.records()):
         for name, begin in _by_datagram().items():
             if isinstance(segment, Segment) and left[name] > 0 and (octets := _with_ends(segment, begin)):
                 samples.setdefault(name, []).append(Chunk(record.time, octets))
@@ -144,8 +144,7 @@ def _by_datagram() -> dict[str, bytes]:
 def _datagram_reader(protocol: str) -> Reader:
     def items(records: Iterator[PacketRecord]) -> Iterator[Item]:
         begin = _by_datagram()[protocol]
-        for record in records:
-            segment = carried(record.link_type, record.data) if record.link_type in NETWORK else None
+        for record, segment in carried_by(records):
             octets = _with_ends(segment, begin) if isinstance(segment, Segment) else None
             if octets:
                 yield Chunk(record.time, octets)
@@ -182,8 +181,7 @@ def _look(file: RecordFile) -> tuple[dict[Key, _Talk], dict[bytes, tuple[str, in
     talks: dict[Key, _Talk] = {}
     snaps: dict[bytes, tuple[str, int]] = {}
     others: Counter[str] = Counter()
-    for record in file.records():
-        found = carried(record.link_type, record.data) if record.link_type in NETWORK else None
+    for record, found in carried_by(file.records()):
         if isinstance(found, Snap):
             protocol = _by_snap().get(found.kind)
             if protocol is not None:
@@ -216,8 +214,7 @@ def _samples(file: RecordFile, talks: dict[Key, _Talk]) -> dict[Key, list[Chunk]
     readers = {key: _Both(talk.is_telnet) for key, talk in talks.items()}
     found: dict[Key, list[Chunk]] = {key: [] for key in talks}
     left = dict.fromkeys(talks, SAMPLE)
-    for record in file.records():
-        segment = carried(record.link_type, record.data) if record.link_type in NETWORK else None
+    for record, segment in carried_by(file.records()):
         if not isinstance(segment, Segment):
             continue
         key = _key(segment)
@@ -276,25 +273,25 @@ class _Both:
 
     def __init__(self, is_telnet: bool) -> None:
         self._is_telnet = is_telnet
-        self._streams: dict[Address, TcpStream] = {}
+        self._order = TcpOrder()
         self._telnets: dict[Address, telnet.Telnet] = {}
 
     def add(self, time: int, segment: Segment) -> Iterator[Item]:
         """What a packet completes."""
-        given: Iterator[bytes | int]
-        if segment.sequence is None:
-            given = iter((segment.payload,))
-        else:
-            given = self._streams.setdefault(segment.source, TcpStream()).add(segment)
-        yield from self._items(time, segment.source, given)
+        if segment.sequence is not None:
+            yield from self._items(self._order.add(time, segment))
+            return
+        if segment.payload:
+            yield Chunk(time, segment.payload)
+        if segment.lost:
+            yield LineEvent(time, LineEventKind.DROPPED, NOT_KEPT, segment.lost)
 
     def close(self, time: int) -> Iterator[Item]:
         """What waits for packets that were not captured."""
-        for source, stream in self._streams.items():
-            yield from self._items(time, source, stream.close())
+        yield from self._items(self._order.close(time))
 
-    def _items(self, time: int, source: Address, given: Iterator[bytes | int]) -> Iterator[Item]:
-        for one in given:
+    def _items(self, said: Iterator[Said]) -> Iterator[Item]:
+        for time, source, one in said:
             if isinstance(one, int):
                 yield LineEvent(time, LineEventKind.DROPPED, "not captured", one)
                 continue
@@ -310,8 +307,7 @@ Reader = Callable[[Iterator[PacketRecord]], Iterator[Item]]
 def _talk_reader(key: Key, talk: _Talk) -> Reader:
     def items(records: Iterator[PacketRecord]) -> Iterator[Item]:
         both, time = _Both(talk.is_telnet), talk.first
-        for record in records:
-            segment = carried(record.link_type, record.data) if record.link_type in NETWORK else None
+        for record, segment in carried_by(records):
             if isinstance(segment, Segment) and _key(segment) == key:
                 time = record.time
                 yield from both.add(time, segment)
@@ -323,8 +319,7 @@ def _talk_reader(key: Key, talk: _Talk) -> Reader:
 def _snap_reader(kind: bytes) -> Reader:
     def items(records: Iterator[PacketRecord]) -> Iterator[Item]:
         held = next(file for one in registry.usable() if (file := one.packet_file) is not None and file.snap == kind)
-        for record in records:
-            found = carried(record.link_type, record.data) if record.link_type in NETWORK else None
+        for record, found in carried_by(records):
             if isinstance(found, Snap) and found.kind == kind and len(found.payload) > held.snap_header:
                 yield Chunk(record.time, held.snap_before + found.payload[held.snap_header :])
 

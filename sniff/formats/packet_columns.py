@@ -23,7 +23,7 @@ from sniff.formats.linktypes import (
     protocol_of,
 )
 from sniff.formats.linktypes import RTAC_ERROR_NAMES as RTAC_ERRORS
-from sniff.formats.records import PacketRecord, items_of
+from sniff.formats.records import PacketRecord, cut_off, items_of
 
 if TYPE_CHECKING:
     from dissectors.columns import Masks, Octets, Times
@@ -38,8 +38,8 @@ BARE = frozenset((OWN, *USERS))
 
 @dataclass(frozen=True, slots=True)
 class Packets:
-    """Records that follow one another: where the data of each begin in `window`, how long they are, ns since the epoch.
-    No comment of theirs matters.
+    """Records that follow one another: where the data of each begin in `window`, how long they are, ns since the epoch,
+    how long they were on the wire. No comment of theirs matters.
     """
 
     window: bytes
@@ -47,16 +47,16 @@ class Packets:
     lengths: Times
     times: Times
     link_type: int
+    on_wire: Times
 
     def __len__(self) -> int:
         return len(self.begins)
 
     def record(self, index: int) -> PacketRecord:
         """One of them."""
-        begin = int(self.begins[index])
-        return PacketRecord(
-            int(self.times[index]), self.link_type, self.window[begin : begin + int(self.lengths[index])]
-        )
+        begin, kept = int(self.begins[index]), int(self.lengths[index])
+        cut = cut_off(kept, int(self.on_wire[index]))
+        return PacketRecord(int(self.times[index]), self.link_type, self.window[begin : begin + kept], cut=cut)
 
 
 def pieces_of(packets: Packets, protocol: str) -> Generator[Item | Reads, None, int]:
@@ -66,6 +66,7 @@ def pieces_of(packets: Packets, protocol: str) -> Generator[Item | Reads, None, 
     if not len(packets):
         return 0
     ordinary, header, is_wanted = _ordinary(packets, protocol)
+    ordinary = ordinary & (packets.on_wire <= packets.lengths)
     nothing = first = 0
     for odd in [*np.flatnonzero(~ordinary).tolist(), len(packets)]:
         if odd - first >= LEAST_RUN:

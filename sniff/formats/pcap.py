@@ -18,7 +18,14 @@ from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, OWN, USER1, USERS
 from sniff.formats.linktypes import protocol_of as protocol_of_link
 from sniff.formats.network import NETWORK
-from sniff.formats.records import PacketRecord, foreign_session, items_of, protocol_of
+from sniff.formats.records import (
+    LONGEST_PACKET,
+    PacketRecord,
+    cut_off,
+    foreign_session,
+    items_of,
+    protocol_of,
+)
 
 if TYPE_CHECKING:
     from dissectors.columns import Reads
@@ -32,7 +39,9 @@ MAGICS = {  # as read little-endian: (byte order, ns a tick)
 }
 _NAMES = {1: " (Ethernet)", 101: " (IP)", 113: " (Linux cooked)", 228: " (IPv4)", 0: " (loopback)"}
 FILE_HEADER, RECORD_HEADER = 24, 16
-LONGEST = 262_144
+LINK_TYPE = 0xFFFF
+"""What of the last word of the header is the link type; above it stands how long the check sum of a frame is."""
+LONGEST = LONGEST_PACKET
 """A longer record is damage: no field bus has frames of that size."""
 
 
@@ -54,7 +63,7 @@ class PcapCapture:
         with open_capture(path) as stream:
             header = stream.read(FILE_HEADER)
             self._order, self._tick = self._check(header)
-            self._link_type: int = struct.unpack_from(self._order + "I", header, 20)[0] & 0x0FFFFFFF
+            self._link_type: int = struct.unpack_from(self._order + "I", header, 20)[0] & LINK_TYPE
             if self._link_type not in LINK_TYPES and self._link_type not in NETWORK:
                 known = ", ".join(map(str, sorted(set(LINK_TYPES) - set(USERS)))) + f", {USERS[0]} to {USERS[-1]}"
                 raise CaptureError(
@@ -92,7 +101,9 @@ class PcapCapture:
             protocol = self.session.protocol
             if self._link_type == OWN and protocol == protocol_of_link(OWN):  # the record is the frame
                 for record in self._records(stream):
-                    if record.data:
+                    if record.cut:
+                        yield from items_of(record, protocol)
+                    elif record.data:
                         yield Chunk(record.time, record.data)
                 return
             for record in self._records(stream):
@@ -130,7 +141,7 @@ class PcapCapture:
             if len(header) < RECORD_HEADER:
                 self._complete = Completeness(False, f"cut inside a record header at octet {at}")
                 return
-            seconds, ticks, kept, _ = layout.unpack(header)
+            seconds, ticks, kept, on_wire = layout.unpack(header)
             if kept > LONGEST:
                 self._complete = Completeness(False, f"damaged at octet {at}: a record of {kept} octets")
                 return
@@ -138,7 +149,8 @@ class PcapCapture:
             if len(data) < kept:
                 self._complete = Completeness(False, f"cut inside a record at octet {at}: {len(data)} of {kept} octets")
                 return
-            yield PacketRecord(seconds * 1_000_000_000 + ticks * self._tick, self._link_type, data)
+            time = seconds * 1_000_000_000 + ticks * self._tick
+            yield PacketRecord(time, self._link_type, data, cut=cut_off(kept, on_wire))
 
 
 def create(path: Path, session: Session, link_type: int, live: bool = False, microseconds: bool = False) -> PcapWriter:

@@ -41,7 +41,7 @@ class PcapWalk:
             if len(begins):
                 heads = heads_at(held, begins, HEADER).view(f"{self._order}u4").astype(np.int64)
                 times = heads[:, 0] * 1_000_000_000 + heads[:, 1] * self._tick
-                yield Packets(held, begins + HEADER, heads[:, 2], times, self._link_type)
+                yield Packets(held, begins + HEADER, heads[:, 2], times, self._link_type, heads[:, 3])
             held = held[end:]
 
     def _begins(self, window: bytes) -> tuple[Times, int]:

@@ -1,8 +1,8 @@
 """pcapng: nanoseconds, comments with our verdict, the CRC-error flag; octets that are no frame on an interface of
 their own. The session travels as a comment of the section, so that our own files come back with their settings.
 
-Read: section header, interface description, enhanced and simple packet blocks, both byte orders, any resolution.
-Other blocks are skipped.
+Read: section header, interface description, enhanced and simple packet blocks and those that came before them, both
+byte orders, any resolution. Other blocks are skipped.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, USER1
 from sniff.formats.network import NETWORK
 from sniff.formats.pcapng_interface import Interface
-from sniff.formats.records import PacketRecord, SearchMarks, foreign_session, items_of, protocol_of
+from sniff.formats.records import PacketRecord, SearchMarks, cut_off, foreign_session, items_of, protocol_of
 
 if TYPE_CHECKING:
     from dissectors.columns import Reads
     from sniff.engine.blocks import Block
     from sniff.formats.pcapng_walk import PlainPackets
 
-SECTION, INTERFACE, SIMPLE, ENHANCED = 0x0A0D0D0A, 1, 3, 6
+SECTION, INTERFACE, OBSOLETE, SIMPLE, ENHANCED = 0x0A0D0D0A, 1, 2, 3, 6
 BYTE_ORDER = 0x1A2B3C4D
 OPT_END, OPT_COMMENT, OPT_NAME, OPT_FLAGS, OPT_TSRESOL, OPT_TSOFFSET = 0, 1, 2, 2, 9, 14
 CRC_ERROR_FLAG = 1 << 24
@@ -204,7 +204,7 @@ class PcapngCapture:
             self._take_session(order, body)
         elif kind == INTERFACE and len(body) >= 8:
             interfaces.append(_interface(order, body))
-        elif kind in (ENHANCED, SIMPLE):
+        elif kind in (ENHANCED, SIMPLE, OBSOLETE):
             return _packet(order, kind, body, interfaces)
         return None
 
@@ -255,17 +255,22 @@ def _interface(order: str, body: bytes) -> Interface:
             resolution = (1_000_000_000, ticks)
         elif code == OPT_TSOFFSET and len(value) == 8:
             offset = struct.unpack(order + "q", value)[0]
-    return Interface(struct.unpack_from(order + "H", body)[0], resolution, offset)
+    link_type, longest = struct.unpack_from(order + "HxxI", body)
+    return Interface(link_type, resolution, offset, longest or LONGEST)
 
 
 def _packet(order: str, kind: int, body: bytes, interfaces: list[Interface]) -> PacketRecord | None:
     if kind == SIMPLE:
         if len(body) < 4 or not interfaces:
             return None
-        return PacketRecord(0, interfaces[0].link_type, body[4 : 4 + struct.unpack_from(order + "I", body)[0]])
+        on_wire = struct.unpack_from(order + "I", body)[0]
+        data = body[4 : 4 + min(on_wire, interfaces[0].longest)]
+        return PacketRecord(0, interfaces[0].link_type, data, cut=cut_off(len(data), on_wire))
     if len(body) < 20:
         return None
-    number, high, low, kept, _ = struct.unpack_from(order + "IIIII", body)
+    number, high, low, kept, on_wire = struct.unpack_from(order + "IIIII", body)
+    if kind == OBSOLETE:  # number of the interface, and how many packets were dropped before
+        number = struct.unpack_from(order + "H", body)[0]
     if number >= len(interfaces) or kept > len(body) - 20:
         return None
     interface = interfaces[number]
@@ -286,7 +291,8 @@ def _packet(order: str, kind: int, body: bytes, interfaces: list[Interface]) -> 
                 comment = text
         elif code == OPT_FLAGS and len(value) == 4:
             crc_error = bool(struct.unpack(order + "I", value)[0] & CRC_ERROR_FLAG)
-    return PacketRecord(time, interface.link_type, body[20 : 20 + kept], comment, crc_error, searched, mark)
+    data, cut = body[20 : 20 + kept], cut_off(kept, on_wire)
+    return PacketRecord(time, interface.link_type, data, comment, crc_error, searched, mark, cut)
 
 
 def _line(text: str) -> LineSettings | None:

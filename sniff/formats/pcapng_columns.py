@@ -48,7 +48,8 @@ def alike(
             yield first, end, None
         else:
             begins, kept = packets.begins[first:end] + HEADER, heads[first:end, 5]
-            yield first, end, Packets(packets.window, begins, kept, times, interfaces[number].link_type)
+            on_wire = heads[first:end, 6]
+            yield first, end, Packets(packets.window, begins, kept, times, interfaces[number].link_type, on_wire)
 
 
 def _times(heads: Times, interface: Interface, latest: int) -> Times | None:

@@ -12,3 +12,4 @@ class Interface:
     link_type: int
     resolution: tuple[int, int] = (1000, 1)  # ns per tick as a fraction
     offset: int = 0  # s
+    longest: int = 1 << 32  # octets of a packet that are kept

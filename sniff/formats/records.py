@@ -34,12 +34,26 @@ FOREIGN_LATENCY = 20_000_000
 """ns; a usual USB adapter's latency timer and some scheduling."""
 
 
+NOT_KEPT = "not kept by who captured: only the begin of each packet"
+"""What is said of octets that a limit of the capture cut off."""
+LONGEST_PACKET = 262_144
+"""Octets of a packet that is no damage; a longer one is nobody's length."""
+
+
+def cut_off(kept: int, on_wire: int) -> int:
+    """Octets that a packet lost in the capture, by its two lengths; -1 where what it says cannot be."""
+    if on_wire <= kept:
+        return 0
+    return on_wire - kept if on_wire <= LONGEST_PACKET else -1
+
+
 @dataclass(frozen=True, slots=True)
 class PacketRecord:
     """One packet of a packet file: `time` ns since the epoch, `comment` "" when none, `crc_error` as flagged.
 
     `searched`: line settings that a search listened with when these octets were heard; None outside a search. `mark`:
-    what a person wrote about it, None for nothing.
+    what a person wrote about it, None for nothing. `cut`: octets at its end that were on the wire and are not in the
+    file, since only so many of a packet were kept; -1 for nobody knows how many.
     """
 
     time: int
@@ -49,6 +63,7 @@ class PacketRecord:
     crc_error: bool = False
     searched: LineSettings | None = None
     mark: str | None = None
+    cut: int = 0
 
 
 class FrameFile(Protocol):
@@ -122,6 +137,8 @@ def items_of(record: PacketRecord, protocol: str) -> Iterator[Item]:
         yield LineEvent(record.time, LineEventKind.DROPPED if dropped else LineEventKind.ERRORS, decoded.event, 1)
     if decoded.octets:
         yield Chunk(record.time, decoded.octets)
+    if record.cut:
+        yield LineEvent(record.time, LineEventKind.DROPPED, NOT_KEPT, record.cut)
 
 
 def protocol_of(record: PacketRecord) -> str | None:

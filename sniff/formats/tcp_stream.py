@@ -11,6 +11,11 @@ MOST_EARLY = 64
 _HALF = 1 << 31
 
 
+def ahead_of(sequence: int, other: int) -> int:
+    """Octets from `other` to `sequence`, which wrap around; negative: before it."""
+    return (sequence - other + _HALF) % (2 * _HALF) - _HALF
+
+
 class TcpStream:
     """Fed segments as they were captured, gives payloads in order; a number stands for so many octets that are lost."""
 
@@ -30,6 +35,10 @@ class TcpStream:
         yield from self._place(sequence, segment.payload, segment.lost)
         if len(self._early) > MOST_EARLY:
             yield from self.close()
+
+    def is_ahead(self, sequence: int) -> bool:
+        """Whether there are octets before that one which have not come in their turn."""
+        return self._next is not None and self._ahead(sequence) > 0
 
     def close(self) -> Iterator[bytes | int]:
         """What waits in vain."""
@@ -74,4 +83,4 @@ class TcpStream:
     def _ahead(self, sequence: int) -> int:
         """Octets between what was given and that; negative: given before."""
         assert self._next is not None
-        return (sequence - self._next + _HALF) % (2 * _HALF) - _HALF
+        return ahead_of(sequence, self._next)

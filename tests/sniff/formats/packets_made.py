@@ -11,7 +11,7 @@ from dissectors.line import NS_PER_S
 Packet = tuple[int, bytes]
 """ns and octets."""
 CLIENT, SERVER = (b"\xc0\x00\x02\x01", 40000), (b"\xc0\x00\x02\x09", 8899)
-SYN, PUSH = 2, 0x18
+SYN, PUSH = 2, 8  # without acknowledgement
 
 
 def tcp(
@@ -21,10 +21,11 @@ def tcp(
     payload: bytes,
     flags: int = PUSH,
     tagged: bool = False,
+    acknowledged: int = 1,
 ) -> bytes:
     """An Ethernet frame with a TCP segment, padded as the wire wants it."""
     ports = struct.pack(">HH", source[1], destination[1])
-    body = ports + struct.pack(">IIBBHHH", sequence & 0xFFFFFFFF, 1, 0x50, flags, 8192, 0, 0) + payload
+    body = ports + struct.pack(">IIBBHHH", sequence & 0xFFFFFFFF, acknowledged, 0x50, flags, 8192, 0, 0) + payload
     return _frame(6, source[0], destination[0], body, tagged)
 
 
