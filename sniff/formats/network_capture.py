@@ -8,49 +8,32 @@ an octet is as late as the network and its buffers made it, which nobody knows.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from dissectors import registry
-from dissectors.frame import Check, Chunk, Frame
+from dissectors.frame import Chunk, Frame
 from dissectors.line import LineSettings, Timing
 from sniff.engine.capture import Capture, CaptureError
-from sniff.engine.session import Adapter, Completeness, Item, LineEvent, LineEventKind, Session
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.formats import telnet
+from sniff.formats.bus_evidence import evidence_of
 from sniff.formats.network import Address, Segment, Snap, shown
 from sniff.formats.network_packets import carried_by
-from sniff.formats.records import FOREIGN_LATENCY, NOT_KEPT, PacketRecord, foreign_session
+from sniff.formats.packet_bus import PacketBus, Reader, RecordFile
+from sniff.formats.records import FOREIGN_LATENCY, NOT_KEPT, PacketRecord
 from sniff.formats.several_buses import one_or_several
 from sniff.formats.tcp_order import Said, TcpOrder
 
 if TYPE_CHECKING:
-    from sniff.engine.blocks import Block
+    pass
 
 SAMPLE = 16_384
 """Octets of a connection by which it is told."""
 MOST_CONNECTIONS = 4096
-LEAST_BITS, COVERED_LEAST = 14.0, 0.5
-"""Evidence in good frames, and their share of the octets, from which on a connection is a bus."""
-_MOST_BITS = 24.0
-
 Key = tuple[bool, Address, Address]
 """TCP or not; the lower of two ends; the other."""
-
-
-class RecordFile(Protocol):
-    """A packet file whose records are read one after the other."""
-
-    path: Path
-
-    def records(self) -> Iterator[PacketRecord]:
-        """All records, as far as the file is whole. Raises CaptureError."""
-        ...
-
-    def completeness(self) -> Completeness:
-        """Whether it is whole, as far as it was read."""
-        ...
 
 
 @dataclass(slots=True)
@@ -70,7 +53,7 @@ def read(file: RecordFile) -> Capture:
     """The buses in a file. Raises CaptureError, saying what is in it, when there is none."""
     talks, snaps, others = _look(file)
     hosts = _of_hosts(file)
-    buses: list[Capture] = []
+    buses: list[PacketBus] = []
     passed: Counter[str] = others
     names = Counter(shown(talk.server) for talk in talks.values())
     for key, talk in talks.items():
@@ -83,23 +66,26 @@ def read(file: RecordFile) -> Capture:
         server, client = shown(talk.server), shown(talk.client)
         name = server if names[server] == 1 else f"{client}-{server}"
         via = "telnet over TCP" if talk.is_telnet else "TCP" if key[0] else "UDP"
-        buses.append(
-            NetworkBus(file, name, protocol, talk.first, f"{via}, {client} to {server}", _talk_reader(key, talk))
-        )
+        buses.append(_bus(file, name, protocol, talk.first, f"{via}, {client} to {server}", _talk_reader(key, talk)))
     for protocol, first in hosts.items():
         told = _datagram_reader(protocol)
-        buses.append(NetworkBus(file, "hosts", protocol, first, "UDP, all hosts", told))
+        buses.append(_bus(file, "hosts", protocol, first, "UDP, all hosts", told))
     for kind, (protocol, first) in snaps.items():
-        buses.append(NetworkBus(file, f"snap-{kind.hex()}", protocol, first, "Ethernet SNAP", _snap_reader(kind)))
+        buses.append(_bus(file, f"snap-{kind.hex()}", protocol, first, "Ethernet SNAP", _snap_reader(kind)))
     buses.sort(key=lambda bus: bus.session.protocol in registry.RELATIVES)  # buses of lines first
     if not buses:
         raise CaptureError(
             f"{file.path}: a capture of a network in which no connection carries a field bus{_list(passed)}"
         )
     for bus in buses:
-        if isinstance(bus, NetworkBus) and passed:
+        if passed:
             bus.beside = f"complete; beside it{_list(passed)}"
     return one_or_several(file.path, buses)
+
+
+def _bus(file: RecordFile, name: str, protocol: str, started: int, via: str, reader: Reader) -> PacketBus:
+    adapter = Adapter("gateway on a network", latency=FOREIGN_LATENCY, latency_from="assumed", detail=via)
+    return PacketBus(file, name, protocol, started, adapter, reader, "capture of a network")
 
 
 def _of_hosts(file: RecordFile) -> dict[str, int]:
@@ -153,24 +139,9 @@ def _datagram_reader(protocol: str) -> Reader:
 
 
 def protocol_of(sample: list[Chunk]) -> str | None:
-    """The protocol whose good frames say most for it; None where none says enough."""
-    octets = sum(len(chunk.octets) for chunk in sample)
-    best: tuple[float, str] | None = None
-    streams = [one for one in registry.relatives() if one.name not in _by_datagram()]
-    for one in (*registry.usable(), *streams):
-        framer = one.framer(Timing(LineSettings.parse(one.default_line), FOREIGN_LATENCY))
-        events = [event for chunk in sample for event in framer.feed(chunk)] + framer.close()
-        good = [event for event in events if isinstance(event, Frame) and _is_good(event, one.name)]
-        bits = sum(min(_MOST_BITS, one.bits(frame)) for frame in good)
-        covered = sum(len(frame.octets) for frame in good)
-        if bits >= LEAST_BITS and covered >= COVERED_LEAST * octets and (best is None or bits > best[0]):
-            best = bits, one.name
-    return best[1] if best is not None else None
-
-
-def _is_good(frame: Frame, protocol: str) -> bool:
-    """A check may be absent only where the network has one."""
-    return frame.damage is None and (frame.check is Check.GOOD or (frame.ok and protocol in registry.RELATIVES))
+    """The protocol of a connection; None where none says enough."""
+    said = evidence_of(sample, [one for one in registry.relatives() if one.name not in _by_datagram()])
+    return said.protocol if said is not None else None
 
 
 # -- the first look --------------------------------------------------------------------------------------------
@@ -301,9 +272,6 @@ class _Both:
                 yield Chunk(time, one)
 
 
-Reader = Callable[[Iterator[PacketRecord]], Iterator[Item]]
-
-
 def _talk_reader(key: Key, talk: _Talk) -> Reader:
     def items(records: Iterator[PacketRecord]) -> Iterator[Item]:
         both, time = _Both(talk.is_telnet), talk.first
@@ -324,31 +292,3 @@ def _snap_reader(kind: bytes) -> Reader:
                 yield Chunk(record.time, held.snap_before + found.payload[held.snap_header :])
 
     return items
-
-
-class NetworkBus:
-    """One connection as a bus. A `Capture`. `beside`: what else is in the file, once it is known to be whole."""
-
-    def __init__(self, file: RecordFile, name: str, protocol: str, started: int, via: str, reader: Reader) -> None:
-        self.path = file.path
-        self.beside = "complete"
-        self._file = file
-        self._reader = reader
-        adapter = Adapter("gateway on a network", latency=FOREIGN_LATENCY, latency_from="assumed", detail=via)
-        session = foreign_session(str(file.path), protocol, started, "capture of a network")
-        self.session: Session = replace(session, bus=name, adapter=adapter)
-
-    def items(self) -> Iterator[Item]:
-        """What both ends said, in order of time. Raises CaptureError."""
-        return self._reader(self._file.records())
-
-    def blocks(self) -> Iterator[Block | LineEvent]:
-        """The same as columns. Raises CaptureError."""
-        from sniff.engine.blocks import blocks_of
-
-        return blocks_of(self.items())
-
-    def completeness(self) -> Completeness:
-        """Whether the file is whole, as far as it was read, and what else is in it."""
-        complete = self._file.completeness()
-        return Completeness(True, self.beside) if complete.whole else complete

@@ -26,6 +26,7 @@ from sniff.formats.records import (
     items_of,
     protocol_of,
 )
+from sniff.formats.usb import USB
 
 if TYPE_CHECKING:
     from dissectors.columns import Reads
@@ -46,8 +47,12 @@ LONGEST = LONGEST_PACKET
 
 
 def read(path: Path) -> Capture:
-    """Open a pcap file; the buses in it where it is one of a network. Raises CaptureError."""
+    """Open a pcap file; the buses in it where it is one of a network or of USB. Raises CaptureError."""
     capture = PcapCapture(path)
+    if capture.link_type in USB:
+        from sniff.formats import usb_capture
+
+        return usb_capture.read(capture)
     if capture.link_type in NETWORK:
         from sniff.formats import network_capture
 
@@ -64,11 +69,11 @@ class PcapCapture:
             header = stream.read(FILE_HEADER)
             self._order, self._tick = self._check(header)
             self._link_type: int = struct.unpack_from(self._order + "I", header, 20)[0] & LINK_TYPE
-            if self._link_type not in LINK_TYPES and self._link_type not in NETWORK:
+            if self._link_type not in LINK_TYPES and self._link_type not in NETWORK | USB:
                 known = ", ".join(map(str, sorted(set(LINK_TYPES) - set(USERS)))) + f", {USERS[0]} to {USERS[-1]}"
                 raise CaptureError(
                     f"{path}: link type {self._link_type}{_NAMES.get(self._link_type, '')} holds no serial frames; "
-                    f"this program reads {known} and networks"
+                    f"this program reads {known}, USB and networks"
                 )
             first = next(self._records(stream), None)
         protocol = protocol_of(first) if first is not None else protocol_of_link(self._link_type)

@@ -21,6 +21,7 @@ from sniff.formats.linktypes import LINK_TYPES, USER1
 from sniff.formats.network import NETWORK
 from sniff.formats.pcapng_interface import Interface
 from sniff.formats.records import PacketRecord, SearchMarks, cut_off, foreign_session, items_of, protocol_of
+from sniff.formats.usb import USB
 
 if TYPE_CHECKING:
     from dissectors.columns import Reads
@@ -34,7 +35,7 @@ CRC_ERROR_FLAG = 1 << 24
 LONGEST = 4 * 1024 * 1024
 """A longer block is damage."""
 SEEN_OF_NETWORK = 1000
-"""Packets of a network before any serial frame, from which on it is a capture of a network."""
+"""Packets of a network or of USB before any serial frame, from which on it is a capture of such."""
 LATEST = (1 << 33) * 1_000_000_000
 """ns since the epoch, in the year 2242; a record that says more, or as much before it, is given this time."""
 SESSION_MARK = "sniff485 session: "
@@ -45,8 +46,12 @@ SEARCH_MARK = "sniff485 search: "
 
 
 def read(path: Path) -> Capture:
-    """Open a pcapng file; the buses in it where it is one of a network. Raises CaptureError."""
+    """Open a pcapng file; the buses in it where it is one of a network or of USB. Raises CaptureError."""
     capture = PcapngCapture(path)
+    if capture.is_of_usb:
+        from sniff.formats import usb_capture
+
+        return usb_capture.read(capture)
     if capture.is_of_network:
         from sniff.formats import network_capture
 
@@ -62,7 +67,7 @@ class PcapngCapture:
         self._complete = Completeness(True)
         self._metadata: dict[str, str] = {}
         self._other = 0
-        self._of_network = 0
+        self._of_network = self._of_usb = 0
         with open_capture(path) as stream:
             first = self._first(stream)
         self._is_without_frames = first is None
@@ -81,7 +86,8 @@ class PcapngCapture:
         for record in self._records(stream):
             if record.link_type not in LINK_TYPES:
                 self._of_network += record.link_type in NETWORK
-                if self._of_network >= SEEN_OF_NETWORK and fallback is None and not self._metadata:
+                self._of_usb += record.link_type in USB
+                if max(self._of_network, self._of_usb) >= SEEN_OF_NETWORK and fallback is None and not self._metadata:
                     return None
                 continue
             if self._metadata or protocol_of(record) is not None:
@@ -93,6 +99,11 @@ class PcapngCapture:
     def is_of_network(self) -> bool:
         """Whether what it holds first, and at all in a short file, is a network's."""
         return self._of_network > 0 and self._is_without_frames
+
+    @property
+    def is_of_usb(self) -> bool:
+        """The same of USB, where there is more of it."""
+        return self._of_usb > self._of_network and self._is_without_frames
 
     def records(self) -> Iterator[PacketRecord]:
         """All records, as far as the file is whole. Raises CaptureError."""
