@@ -143,7 +143,7 @@ CLOCKS: tuple[Clock, ...] = (
     Clock("minutes and seconds", _clock(r"(?P<clock>(?P<m>\d{1,3}):(?P<s>\d{2}\.\d{1,6}))(?![\d:])"),
           _minutes, first=True),
     Clock("time of day with dashes",
-          _clock(r"(?P<dashed>[0-2]?\d(?:-[0-5]\d-|\.[0-5]\d\.)[0-5]\d[.,]\d{1,6})(?![\d.])"), _dashed,
+          _clock(r"(?P<dashed>[0-2]?\d(?:-[0-5]\d-|\.[0-5]\d\.)[0-5]\d[.,]\d{1,6})(?![0-9A-Za-z.])"), _dashed,
           daily=True, first=True),
     Clock("ms", _clock(r"[+]?(?P<number>-?\d{1,12}(?:\.\d{1,6})?) ?ms\b"), _scaled(MS), first=True),
     Clock("µs", _clock(r"[+]?(?P<number>-?\d{1,15}(?:\.\d{1,6})?) ?[uµμ]s\b"), _scaled(MS // 1000), first=True),

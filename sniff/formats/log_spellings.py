@@ -196,7 +196,7 @@ SPELLINGS: tuple[Spelling, ...] = (
              _by(r"0[xX]([0-9A-Fa-f]{1,2})", 16), 2),
     Spelling("0x and pairs, joined", rf"(?:0[xX]{H2}){{3,}}", None, _by(r"0[xX]([0-9A-Fa-f]{2})", 16), 1),
     Spelling("pairs joined by _", H2, "_", _HEX, 3),
-    Spelling("decimals in brackets", r"[^\s()\[\]]{0,4}\(\d{3}\)", r"[ \t]{0,2}", _by(r"\((\d{3})\)", 10), 2,
+    Spelling("decimals in brackets", r"(?:[^\s()\[\]]{0,4}|[()\[\]])\(\d{3}\)", r"[ \t]{0,2}", _by(r"\((\d{3})\)", 10), 2,
              before=r"(?:(?<=\s)|^)", after=""),
     Spelling("three decimals in brackets", r"\[\d{3}\]", r"[ ,]?", _by(r"\[(\d{3})\]", 10), 3, before="", after=""),
     Spelling("digits behind 16#", r"(?:[BW]#)?16#[0-9A-Fa-f]{1,2}", r"[ ]?[,;]?[ ]?",

@@ -664,6 +664,18 @@ add(
         for k, b in enumerate(ALL)
     ),
 )
+DOTTED = ["02.03.00.0A.00.02.E4.3A", "02.03.04.00.01.00.07.99.31", "03.03.00.0B.00.02.B4.2B", "01.03.00.0C.00.02.04.08"]
+add("dots-that-look-like-a-clock", "\n".join(DOTTED) + "\n", bytes.fromhex("".join(DOTTED).replace(".", "")))
+ANSWER = bytes.fromhex("03030400280029285b")
+add(
+    "slsnif-brackets",
+    "Opened /dev/ttyS0; fd=4\n"
+    + "".join(
+        f"{who} --> {''.join(f'{chr(b)}({b:03d})' if 32 < b < 127 else f'({b:03d})' for b in ANSWER)}\n"
+        for who in ("Host  ", "Device") * 8
+    ),
+    ANSWER * 16,
+)
 add("saleae-txt", "Time[s],Value\n" + "".join(f"{k * 0.00115:.9f},{b:02X}\n" for k, b in enumerate(ALL)))
 add("py-bytearray", lines(lambda i, f: f"{way(i)}: {bytearray(f)!r}"))
 add("py-print-hexlify", lines(lambda i, f: f"b'{f.hex()}'"))
