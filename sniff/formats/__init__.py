@@ -68,6 +68,8 @@ def _opened(path: Path) -> Capture:
 
 def _reader(path: Path, start: bytes) -> Callable[[Path], Capture]:
     """The function that opens it. Raises CaptureError, which says what was recognised and what to do."""
+    if not start:
+        raise CaptureError(f"{path}: an empty file")
     found = table.told(start, path.name)
     is_container = start.startswith(tuple(magic for magic, _ in table.UNREADABLE))  # it holds frames by chance only
     damaged = found is not None and not found.last and not found.recognises(start) and not is_container
@@ -80,7 +82,7 @@ def _reader(path: Path, start: bytes) -> Callable[[Path], Capture]:
             if start.startswith(magic):
                 raise CaptureError(f"{path}: {what}")
     if found is None:
-        raise CaptureError(f"{path}: an empty file")
+        raise CaptureError(f"{path}: no capture that this program reads")
     opened: Callable[[Path], Capture] = table.function(found.reader)
     return opened if found.last or found.recognises(start) else _named_only(opened)
 

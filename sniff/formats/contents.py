@@ -20,6 +20,8 @@ _WRITTEN = frozenset((*range(0x20, 0x7F), *b"\t\n\r\f\x1b", *range(0x80, 0x100))
 _HIGH = bytes(range(0x80, 0x100))
 """Octets that text is made of, in any code that ASCII is part of; escapes colour the output of tools."""
 
+_WINDOW = re.compile(rb"\x1b\][0-9]{1,3};[^\x00-\x1f]{0,400}(?:\x07|\x1b\\)")
+
 _CONTROLS_MOST = 0.01
 _UTF16_LEAST, _UTF16_ZEROS = 16, 0.9
 _ASCII_FRAME = re.compile(rb":((?:[0-9A-F]{2}){3,260})(?=[\r\n]|$)")
@@ -76,7 +78,8 @@ def utf16_of(start: bytes) -> str | None:
 
 
 def is_written(start: bytes) -> bool:
-    """Whether nearly all octets are those of text."""
+    """Whether nearly all octets are those of text, or name the window of a terminal, whose output was kept."""
+    start = _WINDOW.sub(b"", start)
     others = start.translate(None, delete=bytes(_WRITTEN))
     low = start[:4096].translate(None, delete=_HIGH)
     return len(others) <= _CONTROLS_MOST * len(start) and 2 * len(low) >= len(start[:4096])

@@ -147,7 +147,7 @@ WAYS = re.compile(
 )
 """How tools say which way octets went."""
 
-COLOURS = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
+COLOURS = re.compile(r"\x1b(?:\[[0-9;?]*[A-Za-z]|\][^\x07\x1b]{0,400}(?:\x07|\x1b\\)|[()][0-9A-Z])")
 """What tools for terminals put around a line."""
 
 REMARK = ("#", ";", "//")

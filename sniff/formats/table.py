@@ -105,6 +105,11 @@ UNREADABLE: tuple[tuple[bytes, str], ...] = (
     (b"MZ", "a program"),
     (b"<!DOCTYPE", "a web page; save the log as text"),
     (b"<html", "a web page; save the log as text"),
+    (b"RIFF", "sound, a film or a picture"),
+    (b"OggS", "sound or a film"),
+    (b"LOGG", "a binary log of Vector's tools; export it as text"),
+    (b"ElfFile\0", "an event log of Windows"),
+    (b"{\\rtf", "a document; save the log as text"),
     (b"btsnoop\0", "a Bluetooth capture; it holds no serial frames"),
     (b"snoop\0\0\0", "a snoop capture; convert it with `editcap -F pcapng`"),
 )

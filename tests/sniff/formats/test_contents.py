@@ -127,3 +127,19 @@ def test_every_format_has_a_name_a_suffix_and_a_way_in_or_out() -> None:
         assert one.magics or one.content
         for target in (one.reader, one.items_writer, one.frames_writer, one.content):
             assert not target or callable(table.function(target))
+
+
+@pytest.mark.parametrize("name", ["x.log", "x.pcap", "x.mcap", "x.cap.txt", "x"])
+def test_an_empty_file_is_said_whatever_its_name_is(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).touch()
+    with pytest.raises(CaptureError, match="an empty file"):
+        read(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    "around", ["\x1b]0;root@pi: ~\x07", "\x1b]0;pi\x1b\\", "\x1b[?2004h\x1b[0;36m", "\x1b(B\x1b[m"]
+)
+def test_the_output_of_a_terminal_is_text(around: str, tmp_path: Path) -> None:
+    path = tmp_path / "typescript"
+    path.write_text("".join(f"{around}10:00:0{at}.000 RX: 01 03 00 00 00 02 C4 0B\x1b[0m\r\n" for at in range(8)))
+    assert [item.octets.hex() for item in read(path).items() if isinstance(item, Chunk)] == ["010300000002c40b"] * 8
