@@ -90,6 +90,7 @@ class LineFindings:
         self._unplugged_at: int | None = None
         self._away = 0
         self._lost_octets = self._only_heard = 0
+        self._is_lost_counted = True
         self._echoes = EchoesHeard(session.timing.latency)
         self._values: Counter[int] = Counter()
         self._before_ok = True  # the newest frame
@@ -155,6 +156,7 @@ class LineFindings:
         if kind is LineEventKind.DROPPED:
             self._lost.add(event.time)
             self._lost_octets += max(0, event.count)
+            self._is_lost_counted = self._is_lost_counted and event.count >= 0
         elif kind is LineEventKind.UNPLUGGED:
             self._unplugged.add(event.time)
             self._unplugged_at = event.time
@@ -317,6 +319,7 @@ class LineFindings:
     def _of_host(self) -> Iterator[Finding]:
         if self._lost.count:
             many = counted(self._lost_octets, "octet") if self._lost_octets else "an unknown number of octets"
+            many = many if self._is_lost_counted or not self._lost_octets else f"at least {many}"
             yield self._lost.found(RULES["LN005"], "adapter", f"{many} lost {times(self._lost.count)}")
         if self._unplugged.count:
             words = f"unplugged {times(self._unplugged.count)}"

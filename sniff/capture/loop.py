@@ -14,7 +14,7 @@ from functools import partial
 
 from dissectors.frame import Chunk
 from dissectors.line import MS, NS_PER_S, LineSettings
-from sniff.capture.disk_watch import DiskWatch
+from sniff.capture.disk_watch import SLOW, DiskWatch
 from sniff.capture.frame_counter import FrameCounter
 from sniff.capture.ipc import (
     LOSSY,
@@ -57,6 +57,9 @@ DRAIN = 0.2
 CLOSING_EVERY = 0.5
 LOOK_EVERY = 0.02
 """Seconds between words to the main process, and between looks at the files, while they are closed."""
+
+STALLED = 2 * NS_PER_S
+"""ns that this process was not let run, from which on what came meanwhile may be lost, and has no time of its own."""
 
 _COMMAND_SIZE = 64 * 1024
 _FAR = 1 << 62
@@ -104,6 +107,8 @@ class CaptureLoop:
     _hurried: bool = False
     _offset: int = 0
     _due: int = _FAR
+    _ran_at: int = 0
+    _ran_again: int = -_FAR
     _heard: bool = False  # since the last step
     _buses: list[_Bus] = field(default_factory=list)
 
@@ -129,7 +134,7 @@ class CaptureLoop:
         self._unknown = {index for index, session in enumerate(self.sessions) if session.unknown}
         self._beat_while_busy = BEAT if self.watched or self._unknown or self._counters else UNWATCHED_BEAT
         now = self.clock.now()
-        self._beat_at = self._status_at = now
+        self._beat_at = self._status_at = self._ran_at = now
         self._busy_until = now
         if self.commands is not None:
             self.commands.setblocking(False)
@@ -196,8 +201,13 @@ class CaptureLoop:
 
     def step(self) -> None:
         """One turn: wait for whatever comes first, and take it."""
-        wait = min(self._beat_at, self._due) - self.clock.now()
-        for _, call in self._waiting.wait(max(0, wait) / 1e9):
+        wait = max(0, min(self._beat_at, self._due) - self.clock.now())
+        ready = self._waiting.wait(wait / 1e9)
+        now = self.clock.now()
+        if now - self._ran_at - wait >= STALLED:
+            self._say_stalled(now, now - self._ran_at)
+        self._ran_at = now
+        for _, call in ready:
             call()
         now = self.clock.now()
         if self._heard:
@@ -210,6 +220,15 @@ class CaptureLoop:
                     self._take(bus)
         if now >= self._beat_at or self.outlet.gathered > FLUSH_AT:
             self._beat(now)
+
+    def _say_stalled(self, now: int, time: int) -> None:
+        """Nobody read for so long: stopped, or a computer that did not get round to it. Its buffers hold some of what
+        came, as if it had come now."""
+        self._ran_again = now
+        for bus in self._buses:
+            if bus.fd is not None:
+                text = f"nobody knows how many: this process did not run for {time / NS_PER_S:.0f} s"
+                self._keep(bus.index, LineEvent(bus.source.now(), LineEventKind.DROPPED, text, -1))
 
     def _take(self, bus: _Bus) -> bool:
         """One read of a source; whether it gave anything."""
@@ -297,9 +316,10 @@ class CaptureLoop:
         news = False
         for index, (recorder, watch) in enumerate(zip(self.recorders, self._watches, strict=True)):
             told = [recorder.notices.popleft() for _ in range(len(recorder.notices))]
-            failing = recorder.trouble is not None  # which is said, and explains that nothing is written
-            behind = 0 if failing else recorder.behind(now)
-            slow = watch.see(now, behind, recorder.syncing, recorder.lost_octets)
+            # trouble is said, and explains that nothing is written; so does that nobody ran
+            explained = recorder.trouble is not None or now - self._ran_again < SLOW
+            behind, syncing = (0, 0) if explained else (recorder.behind(now), recorder.syncing)
+            slow = watch.see(now, behind, syncing, recorder.lost_octets)
             for text in told + ([slow] if slow is not None else []):
                 news = True
                 self._keep(index, LineEvent(self._buses[index].source.now(), LineEventKind.NOTE, text))

@@ -250,6 +250,17 @@ def say_recorded(live: LiveBus, where: bool = True, bus: str = "") -> None:
         print(f"sniff485: {what}{'; the recording has them' if live.link.paths else ''}", file=sys.stderr)
     if status.omitted:
         print(f"sniff485: {bus}{status.omitted} octets not kept: no trigger asked for them", file=sys.stderr)
+    say_lost(live, bus)
+    if live.file_is_gone:
+        print(f"sniff485: {sanitized(status.path or live.link.paths[0])} is not there any more", file=sys.stderr)
+    elif status.path and where:
+        cut = "" if ended is None or ended.clean else ", cut where the capture was ended"
+        print(f"sniff485: recorded to {sanitized(status.path)}{cut}", file=sys.stderr)
+
+
+def say_lost(live: LiveBus, bus: str = "") -> None:
+    """What is not in the recording, on standard error; nothing where all is. `bus`: what the line begins with."""
+    status, ended = live.status, live.ended
     lost = status.lost
     if ended is not None and not ended.clean and status.unwritten:
         lost += status.unwritten
@@ -257,11 +268,6 @@ def say_recorded(live: LiveBus, where: bool = True, bus: str = "") -> None:
     elif lost:
         why = "" if status.error else _why_lost(status)
         print(f"sniff485: {bus}{lost} octets NOT RECORDED{why}", file=sys.stderr)
-    if live.file_is_gone:
-        print(f"sniff485: {sanitized(status.path or live.link.paths[0])} is not there any more", file=sys.stderr)
-    elif status.path and where:
-        cut = "" if ended is None or ended.clean else ", cut where the capture was ended"
-        print(f"sniff485: recorded to {sanitized(status.path)}{cut}", file=sys.stderr)
 
 
 def _why_lost(status: Status) -> str:

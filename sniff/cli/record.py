@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 
+from sniff.analysis.sanitizing import sanitized
 from sniff.capture.config import RecordSpec
 from sniff.cli import USAGE, Failure, arguments, listening, outlets, printing, targets, telling
 from sniff.cli.interruption import until_interrupted
@@ -55,7 +56,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="values, findings and health on standard output: JSON Lines",
     )
     outlets.add_outlets(parser)
-    parser.add_argument("-q", "--quiet", action="store_true", help="no progress, no summary")
+    parser.add_argument("-q", "--quiet", action="store_true", help="no progress, no summary; only what goes wrong")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -87,4 +88,7 @@ def run(args: argparse.Namespace) -> int:
             raise
     if not args.quiet:
         listening.say_end(printers)
+    else:  # what is lost is no summary
+        for live in lives:
+            listening.say_lost(live, "" if len(lives) == 1 else f"{sanitized(live.session.bus)}: ")
     return code

@@ -289,7 +289,8 @@ def test_a_gateway_that_closes_is_waited_for(begin, tmp_path) -> None:
     assert octets_of(tmp_path / "x.mcap") == 2 * POLL
 
 
-def test_a_full_disk_is_said_at_once_and_ends_in_an_error(begin, tmp_path) -> None:
+@pytest.mark.parametrize("quiet", [(), ("-q",)])
+def test_a_full_disk_is_said_at_once_and_ends_in_an_error(begin, tmp_path, quiet) -> None:
     """A limit on the size of files stands for the disk: writing fails in the same way, without any rights."""
     import resource
 
@@ -297,7 +298,7 @@ def test_a_full_disk_is_said_at_once_and_ends_in_an_error(begin, tmp_path) -> No
     try:
         limit = (50_000, 50_000)
         process = begin(
-            "record", str(noisy.link), "-s", "115200,8N1", "-w", "x.mcap",
+            "record", str(noisy.link), "-s", "115200,8N1", "-w", "x.mcap", *quiet,
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit),
         )  # fmt: skip
         line = next_line(process)
