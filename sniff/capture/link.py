@@ -211,7 +211,10 @@ class CaptureLink:
         return messages
 
     def look(self, timeout: float = 0.0) -> bool:
-        """Read on, without giving anything out; whether the other end is open."""
+        """Read on, without giving anything out; whether the other end is open. After Ended it is not: who shares a
+        capture may look once more when another has let it go."""
+        if self.ended is not None:
+            return False
         self._send()
         try:
             alive = self._malformed is None and self._fill(timeout)

@@ -64,6 +64,7 @@ def test_stopping_gives_the_rest_and_the_end(pty, octets) -> None:
     assert messages[-1] == Ended("stopped")
     assert octets(messages) == b"last"
     assert link.receive() == []
+    assert not link.look()  # who shares it may look once more
     with pytest.raises(ProcessLookupError):
         os.kill(link.pid, 0)
 
