@@ -56,6 +56,13 @@ def read_digital_csv(path: Path) -> Capture:
     return one_or_several(path, read(DigitalTable(path)))
 
 
+def read_voltages(path: Path) -> Capture:
+    """Open a table of voltages. Raises CaptureError."""
+    from sniff.formats.scope import VoltageTable
+
+    return one_or_several(path, read(VoltageTable(path)))
+
+
 def read_digital_binary(path: Path) -> Capture:
     """Open a binary export of one digital channel. Raises CaptureError."""
     from sniff.formats.saleae import DigitalBinary

@@ -2,13 +2,14 @@
 
 | file | looks like |
 |---|---|
-| CSV | `Time [s],Channel 0,Channel 1`, then a time and 0 or 1 for each channel; also times of ISO 8601 |
+| CSV | `Time [s],Channel 0,Channel 1`, then a time and 0 or 1 for each channel; also times of ISO 8601, remarks above |
 | binary (`digital_0.bin`) | `<SALEAE>`, version 0, type 0, level, begin, end, count, then times as 64-bit floats |
 """
 
 from __future__ import annotations
 
 import csv
+import re
 import struct
 from collections.abc import Iterator
 from datetime import datetime
@@ -31,16 +32,26 @@ if TYPE_CHECKING:
 MAGIC = b"<SALEAE>"
 HEADER = struct.Struct("<8siiIddQ")
 LONGEST_LINE = 1 << 16
+REMARKS = ("#", ";")
+"""Begin lines above the heading, of WaveForms and sigrok."""
+SAMPLED = re.compile(r"sample ?rate", re.IGNORECASE)
 AT_ONCE = 1 << 16
 """Edges that are gathered."""
 LATEST = float(1 << 33)
 
 
+def _has_times(heading: str) -> bool:
+    return heading.strip().strip('"').lower().startswith("time")
+
+
 def is_digital_csv(lines: list[str]) -> bool:
     """Whether the first lines of a text are a table of levels over time."""
-    rows = [line for line in lines if line.strip()]
-    if len(rows) < 2 or not rows[0].strip().strip('"').lower().startswith("time"):
+    rows = [line for line in lines if line.strip() and not line.startswith(REMARKS)]
+    if len(rows) < 2:
         return False
+    if not _has_times(rows[0]):
+        is_sampled = any(SAMPLED.search(line) for line in lines if line.startswith(REMARKS))
+        return is_sampled and all(cell.strip() in ("0", "1") for line in rows[1:] for cell in line.split(","))
     if heading_of(rows[0], ",", rows[1:]) is not None:
         return False
     names, first = rows[0].split(","), rows[1].split(",")
@@ -55,10 +66,12 @@ class DigitalTable:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._passed = self._first_passed = 0
+        self._passed = self._first_passed = self._above = 0
         rows = self._rows()
         heading = next(rows, (0, []))[1]
         first = next(rows, (0, []))[1]
+        if heading and not _has_times(heading[0]):
+            raise CaptureError(f"{path}: levels without times; export them with a time in each row, or as .sr or .vcd")
         if len(heading) < 2 or len(first) < 2:
             raise CaptureError(f"{path}: no table of levels: expected a heading with a time and channels")
         self.channels = [name.strip()[:60] or f"channel {at}" for at, name in enumerate(heading[1:])][:MOST_CHANNELS]
@@ -117,13 +130,19 @@ class DigitalTable:
                 row = [""]
             if row is None:
                 return
-            yield reader.line_num, row
+            yield reader.line_num + self._above, row
 
     def _lines(self) -> Iterator[str]:
         with open_capture(self.path) as stream:
             try:
+                is_above, self._above = True, 0
                 while line := stream.readline(LONGEST_LINE):
-                    yield line.decode("utf-8", "replace").rstrip("\r\n").removeprefix("\ufeff")
+                    text = line.decode("utf-8", "replace").rstrip("\r\n").removeprefix("\ufeff")
+                    is_above = is_above and (not text.strip() or text.startswith(REMARKS))
+                    if is_above:
+                        self._above += 1
+                    else:
+                        yield text
             except OSError as error:
                 raise explain(self.path, error) from None
 

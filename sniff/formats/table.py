@@ -81,6 +81,8 @@ BUILT_IN: tuple[Format, ...] = (
            reader="sniff.formats.logic_capture:read_vcd"),
     Format("table of levels", (), content="sniff.formats.waves_told:is_levels",
            reader="sniff.formats.logic_capture:read_digital_csv"),
+    Format("table of voltages", (), content="sniff.formats.waves_told:is_voltages",
+           reader="sniff.formats.logic_capture:read_voltages"),
     Format("Saleae binary export", (), content="sniff.formats.waves_told:is_saleae_binary",
            reader="sniff.formats.logic_capture:read_digital_binary"),
     Format("raw dump", _DUMPS, content="sniff.formats.contents:is_raw", reader="sniff.formats.raw_dump:read",

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import re
 
-from sniff.formats import saleae, sigrok
+from sniff.formats import saleae, scope, sigrok
+
+REMARKS_MOST = 24
+"""Lines in which the first rows of a table of levels are."""
 
 _DECLARATION = re.compile(rb"\s*\$(?:date|version|timescale|comment|scope|var)\b")
 
@@ -24,7 +27,13 @@ def is_vcd(start: bytes) -> bool:
 def is_levels(start: bytes) -> bool:
     """Whether it is a table of levels over time."""
     lines = start[:8192].decode("utf-8", "replace").removeprefix("\ufeff").splitlines()
-    return saleae.is_digital_csv(lines[:4])
+    return saleae.is_digital_csv(lines[:REMARKS_MOST])
+
+
+def is_voltages(start: bytes) -> bool:
+    """Whether it is a table of voltages over time."""
+    lines = start[:16384].decode("utf-8", "replace").removeprefix("\ufeff").splitlines()
+    return scope.is_voltages(lines[: scope.HEADING + 2 * scope.LEAST_ROWS][:-1])
 
 
 def is_saleae_binary(start: bytes) -> bool:
