@@ -329,7 +329,8 @@ class CaptureLoop:
         offset = self.clock.drift()
         if abs(offset - self._offset) > STEP:
             self._offset = offset
-            text = f"wall clock is {offset / MS:+.3f} ms from the capture's"
+            off = f"{offset / MS:+.3f} ms" if abs(offset) < NS_PER_S else f"{offset / NS_PER_S:+.3f} s"
+            text = f"wall clock is {off} from the capture's"
             for bus in self._buses:
                 event = LineEvent(now, LineEventKind.CLOCK, text, offset)
                 self._keep(bus.index, event)

@@ -114,7 +114,7 @@ class Printer:
         if event.kind in (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED):
             self.before_saying()
             print(f"sniff485: {sanitized(event.text)}", file=sys.stderr)  # names the port
-        elif event.kind in (LineEventKind.NOTE, LineEventKind.REFUSED):
+        elif event.kind in (LineEventKind.NOTE, LineEventKind.REFUSED, LineEventKind.CLOCK):
             self._say(event.text)
         elif event.kind is LineEventKind.TRIGGER:
             self._say(f"triggered by {event.text}")

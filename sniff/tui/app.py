@@ -35,6 +35,7 @@ from sniff.tui.prompt import Prompt
 from sniff.tui.screens import SCREENS, STYLED, Entry, load
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.seats import BusLine, Seat
+from sniff.tui.termination import ends_when_asked
 from sniff.tui.themes import DARK, DARK_SIXTEEN, DIM, LIGHT, LIGHT_SIXTEEN, THEMES
 from sniff.tui.view_state import Viewing
 
@@ -188,6 +189,8 @@ class SnifferApp(Analyzer):
 
     def on_mount(self) -> None:
         """Start to poll."""
+        if self.is_alone:
+            ends_when_asked(self.exit)
         try:
             colours = load_config().colours
             for seat in self._followed.seats:
