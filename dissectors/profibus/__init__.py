@@ -66,7 +66,7 @@ PROFIBUS = Dissector(
     rules=RULES,
     ring=RING,
     readings=readings,
-    packet_file=PacketFile((147,), least=1),
+    packet_file=PacketFile((147, 257), least=1),
     renamer=on_first_use("dissectors.profibus.renamer:ProfibusRenamer"),
     scenarios=on_first_use("dissectors.profibus.scenario:scenarios"),
     kernel=kernel,

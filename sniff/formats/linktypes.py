@@ -1,6 +1,7 @@
 """Link types of pcap records: how a frame is written into it and read out of it. Pure.
 
 165  A link type of a protocol's own: the frame as it is; Wireshark reads it without set-up.
+257  Another one's; read, and written where it is asked for.
 147  User 0: the bare frame; Wireshark needs a DLT_USER entry.
 250  RTAC Serial: a 12-octet header with an event, then the frame; line errors are events without octets.
 252  Exported PDU: tags that name the dissector and synthetic addresses, then the frame; no set-up.
@@ -20,6 +21,8 @@ from dissectors.frame import Frame, LineError, Role
 from dissectors.manifest import Dissector, PacketFile
 
 OWN, USER0, USER1, RTAC, EXPORTED = 165, 147, 148, 250, 252
+OWNS = (OWN, 257)
+"""Link types that are a protocol's own."""
 USERS = range(USER0, 163)
 """User 0 … 15, which serial capture programs let one choose from (WiresharkSerialAdapter)."""
 
@@ -139,8 +142,7 @@ def _write_exported(frame: Frame, role: Role, station: int | None, _time: int) -
 
 
 LINK_TYPES: dict[int, LinkType] = {
-    OWN: LinkType(OWN, _plain, _write_plain),
-    **{number: LinkType(number, _plain, _write_plain) for number in USERS},
+    **{number: LinkType(number, _plain, _write_plain) for number in (*OWNS, *USERS)},
     RTAC: LinkType(RTAC, _read_rtac, _write_rtac),
     EXPORTED: LinkType(EXPORTED, _read_exported, _write_exported),
 }

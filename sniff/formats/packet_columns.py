@@ -14,7 +14,7 @@ from sniff.engine.session import Item
 from sniff.formats.linktypes import (
     EXPORTED,
     LINK_TYPES,
-    OWN,
+    OWNS,
     RTAC,
     RTAC_HEADER,
     RTAC_LOST,
@@ -32,7 +32,7 @@ WINDOW = 1 << 19
 """Octets of a file that are looked at together; more than any record of a pcap file has."""
 LEAST_RUN = 16
 """Fewer records in a row are not worth arrays."""
-BARE = frozenset((OWN, *USERS))
+BARE = frozenset((*OWNS, *USERS))
 """Link types whose records are the frame and nothing else."""
 
 

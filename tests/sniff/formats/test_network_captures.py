@@ -273,6 +273,14 @@ def test_bare_frames_of_any_user_link_type(tmp_path: Path, write: Callable[..., 
     assert held == b"".join(frames)
 
 
+@pytest.mark.parametrize("write", [as_pcap, as_pcapng])
+def test_a_link_type_of_a_protocol_names_it(tmp_path: Path, write: Callable[..., Path]) -> None:
+    frames = [bytes.fromhex(one) for one in ("dc0302", "100302494e16", "dc0203", "dc0302")]
+    capture = read(write(tmp_path / "x.pcap", [(START + at * MS, one) for at, one in enumerate(frames)], 257))
+    assert capture.session.protocol == "profibus"
+    assert _octets(capture) == b"".join(frames)
+
+
 def test_any_protocol_may_lie_in_rtac_records(tmp_path: Path) -> None:
     token = bytes.fromhex("55ff000172000084")
     records = [(START + at * 20 * MS, rtac_record(at * 20 * MS, 1 + at % 2, token)) for at in range(40)]
