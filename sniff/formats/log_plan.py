@@ -19,6 +19,7 @@ from sniff.formats.log_margin import NO_MARGIN, Margin, margin_of
 from sniff.formats.log_octets import PAIRS_ONLY
 from sniff.formats.log_shapes import Role
 from sniff.formats.log_times import AS_WRITTEN, FASTEST, Times, counted, number_ahead, order_of
+from sniff.formats.usb_serial import STATUS, begin_with_status
 
 LOOKED_AT = 2000
 """Lines of a log that are looked at."""
@@ -53,7 +54,7 @@ class Plan:
     `spellings`: how octets are written. `margin`, `times`: what is no part of the lines, how their times are read.
     `heads`: those above rows that repeat others. `growing`: labels whose lines tell what was heard so far, so that the
     next has the same with more behind. `labelled`: whether lines with octets have a label; `lower`: whether
-    their digits are small letters.
+    their digits are small letters; `with_status`: whether what a USB adapter sent begins with its status.
     """
 
     kind: str
@@ -71,11 +72,14 @@ class Plan:
     lower: bool = False
     heads: frozenset[str] = frozenset()
     growing: frozenset[str] = frozenset()
+    with_status: bool = False
 
     def line(self, text: str) -> Line:
         """A line taken apart as this log writes it."""
         text = self.margin.without(text)
         line = line_of(text, self.base, self.offsets is not None, self.times)
+        if self.with_status and _is_of_adapter(line):
+            line = replace(line, octets=line.octets[STATUS:], kind=line.kind if line.octets[STATUS:] else Kind.SHAPE)
         is_other = line.kind in (Kind.TEXT, Kind.STRANGE) or line.spelling == "one octet"
         if is_other and _JOINED in self.spellings and self.offsets is None:
             short = line_of(text, self.base, False, self.times, _SHORT)
@@ -127,7 +131,13 @@ def _plan(texts: Sequence[str]) -> Plan | None:
     if times.clocks_only:
         lines = [line_of(text, base, False, times) for text in texts]
     plan = _of_labels([line for line in lines if line.kind is not Kind.EMPTY], base)
-    return replace(plan, times=times) if plan is not None else None
+    with_status = begin_with_status([line.octets for line in lines if _is_of_adapter(line)])
+    return replace(plan, times=times, with_status=with_status) if plan is not None else None
+
+
+def _is_of_adapter(line: Line) -> bool:
+    """Whether it tells what an adapter sent over USB."""
+    return line.tool == "usbmon" and line.way == "Bi" and line.octets != b""
 
 
 def _heads(texts: Sequence[str], lines: Sequence[Line]) -> frozenset[str]:

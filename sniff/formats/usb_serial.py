@@ -6,12 +6,28 @@ speed) 512 octets, and send that alone when nothing was heard. What they are sen
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
 
 from dissectors.frame import LineError, Mark
 
 STATUS = 2
 _ERRORS = ((0x02, LineError.OVERRUN), (0x04, LineError.PARITY), (0x08, LineError.FRAMING), (0x10, LineError.BREAK))
+
+
+_LEAST, _MOSTLY = 4, 0.8
+_IDLE = 0x60
+"""Nothing waits to be sent, of the second octet."""
+
+
+def begin_with_status(packets: Sequence[bytes]) -> bool:
+    """Whether what an adapter sent begins with its status: all of it, and mostly nothing waited to be sent."""
+    idle = sum(packet[1:2] != b"" and packet[1] & _IDLE == _IDLE for packet in packets)
+    return (
+        len(packets) >= _LEAST
+        and idle >= _MOSTLY * len(packets)
+        and all(len(packet) >= STATUS and packet[0] & 0x0F in (1, 2) for packet in packets)
+    )
 
 
 class Laid(Enum):

@@ -664,6 +664,13 @@ add(
         for k, b in enumerate(ALL)
     ),
 )
+USBMON = [
+    f"ffff88003719c240 {3575914555 + i * 50000} {'S Bo:1:005:2 -115' if i % 2 == 0 else 'C Bi:1:005:1 0'} "
+    f"{len(f) + 2 * (i % 2)} = {(bytes([1, 0x60]) * (i % 2) + f).hex(' ', -4)}\n"
+    f"ffff88003719c300 {3575914655 + i * 50000} C Bi:1:005:1 0 2 = 0160\n"
+    for i, f in enumerate(FR)
+]
+add("usbmon-ftdi", "".join(USBMON), delta=50_000_000)
 DOTTED = ["02.03.00.0A.00.02.E4.3A", "02.03.04.00.01.00.07.99.31", "03.03.00.0B.00.02.B4.2B", "01.03.00.0C.00.02.04.08"]
 add("dots-that-look-like-a-clock", "\n".join(DOTTED) + "\n", bytes.fromhex("".join(DOTTED).replace(".", "")))
 ANSWER = bytes.fromhex("03030400280029285b")
