@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib.util
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,9 @@ from sniff.engine.table import Table
 from sniff.formats import read as open_capture
 from sniff.formats.parquet import I64, Kind
 from sniff.formats.several_buses import buses_in, chosen
+
+OF_TIME = frozenset(("t", "time", "start_ns", "end_ns", "time_ns"))
+"""Columns that hold when something was."""
 
 
 class NoDataFrames(ImportError):
@@ -98,14 +102,14 @@ class DataCapture:
         the transaction that the frame belongs to. `octets`: with those on the wire, which makes an object of each row.
         """
         if not octets:
-            return _maker()(self._read().frames(), {})
+            return _maker()(self._known(self._read().frames()), {})
         columns = self._read_anew(octets=True)
-        return _maker()(columns.frames(), {"octets": columns.octets()})
+        return _maker()(self._known(columns.frames()), {"octets": columns.octets()})
 
     def transactions(self) -> Any:
         """A row for every transaction, in the order of closing. Response times in ms, with the least and the most that
         the adapter allows; `request` and `response` are numbers (`no`) of frames, `of` a transaction (`tx`)."""
-        return _maker()(self._read().transactions(), {})
+        return _maker()(self._known(self._read().transactions()), {})
 
     def values(self) -> Any:
         """A row for every value that was read or written, as `points --parquet` has it; `time_ns` since the epoch."""
@@ -120,7 +124,16 @@ class DataCapture:
             columns[name] = _column(kind, cells)
             if kind is Kind.TIME:
                 columns[f"{name}_ns"] = _column(Kind.INTEGER, cells)
-        return make(columns, {})
+        return make(self._known(columns), {})
+
+    def _known(self, columns: Columns) -> Columns:
+        """The columns, those of times empty where the capture does not say when anything came."""
+        if self.session.has_times:
+            return columns
+        return {
+            name: replace(column, missing=np.ones(len(column.values), bool)) if name in OF_TIME else column
+            for name, column in columns.items()
+        }
 
     def _read(self) -> TableColumns:
         if self._columns is None:

@@ -311,6 +311,8 @@ class LineFindings:
             words = f"line errors reported: {', '.join(adapter.reports)}"
         if adapter.detail:
             words += f" ({adapter.detail})"
+        if not self._session.has_times:
+            return self._whole("LN001", "adapter", f"{words}; when anything came is not known")
         words += f"; octets are held back for {milliseconds(adapter.latency)} at most" if adapter.latency else ""
         words += "; times are taken as exact" if not adapter.latency else ""
         words += f" ({adapter.latency_from})"

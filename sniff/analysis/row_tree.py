@@ -25,13 +25,13 @@ def tree_of(
     dissector: Dissector,
     row: Row,
     transaction: Transaction | None,
-    time_text: Callable[[int], str],
+    time_text: Callable[[int], str] | None,
     meaning: Meaning | None = None,
 ) -> tuple[Field, ...]:
     """Everything about a row: what it means to its device, the layers of its packet, how it was found, its transaction
     where that has closed.
 
-    `time_text` writes times (ns since the epoch).
+    `time_text` writes times (ns since the epoch); None: nobody knows when anything came.
     """
     event = row.event
     known = [_event(row, time_text)]
@@ -77,14 +77,18 @@ def _cover(lines: list[Field]) -> tuple[int | None, int | None]:
     return min(begins, default=None), max(ends, default=None)
 
 
-def _event(row: Row, time_text: Callable[[int], str]) -> Field:
+def _event(row: Row, time_text: Callable[[int], str] | None) -> Field:
     event = row.event
     count = len(event.octets)
-    times = [
-        Field("start", time_text(event.start)),
-        Field("end", time_text(event.end)),
-        Field("lasts", milliseconds(event.end - event.start)),
-    ]
+    times = (
+        [
+            Field("start", time_text(event.start)),
+            Field("end", time_text(event.end)),
+            Field("lasts", milliseconds(event.end - event.start)),
+        ]
+        if time_text is not None
+        else []
+    )
     marks = [
         Field(f"octet {mark.offset}", mark_names(mark.error), mark.offset, mark.offset + 1)
         for mark in event.marks[:100]
@@ -100,7 +104,7 @@ def _event(row: Row, time_text: Callable[[int], str]) -> Field:
         about.append(Field("expected length", _octets(event.expected)))
     if event.skipped:
         about.append(Field("noise before", _octets(event.skipped)))
-    if event.slack:
+    if event.slack and time_text is not None:
         about.append(Field("ends up to", f"{milliseconds(event.slack)} earlier"))
     if event.flags:
         about.append(Field("odd", sanitized(", ".join(event.flags))))

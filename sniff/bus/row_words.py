@@ -38,17 +38,19 @@ GOOD_VERDICTS = {"answered", "broadcast", "data", "open"}
 def to_json(item: JudgedRow, dissector: Dissector, session: Session, with_fields: bool = False) -> dict[str, Any]:
     """One object a frame; the keys and their order are a promise. Noise has null where it has no such thing.
 
-    What a search heard is an object too: "kind" is "searching", and "ok" null, for it is neither.
+    What a search heard is an object too: "kind" is "searching", and "ok" null, for it is neither. Of a capture that
+    does not say when anything came all times are null.
     """
     row, transaction = item.row, item.transaction
     event, header, placement = row.event, row.header, row.placement
     frame = event if isinstance(event, Frame) else None
     latency = transaction.latency if transaction is not None else None
+    has_times = session.has_times
     result: dict[str, Any] = {
         "no": row.no,
-        "t": iso(event.start),
-        "start_ns": since_start(event.start, session),
-        "end_ns": since_start(event.end, session),
+        "t": iso(event.start) if has_times else None,
+        "start_ns": since_start(event.start, session) if has_times else None,
+        "end_ns": since_start(event.end, session) if has_times else None,
         "proto": header.protocol if header else None,
         "src": placement.source if placement else header.source if header else None,
         "dst": placement.destination if placement else header.destination if header else None,
@@ -89,7 +91,8 @@ def json_line(
 
 def typed(item: JudgedRow, dissector: Dissector, session: Session) -> list[Any]:
     """The values of `to_json` in the types of `COLUMNS`: the time is ns since the epoch."""
-    return list({**to_json(item, dissector, session), "t": item.row.event.start}.values())
+    time = item.row.event.start if session.has_times else None
+    return list({**to_json(item, dissector, session), "t": time}.values())
 
 
 def role_of(item: JudgedRow) -> Role:
@@ -163,11 +166,15 @@ def asks_of(item: JudgedRow, dissector: Dissector) -> list[dict[str, Any]]:
     ]
 
 
+NO_TIME = f"{'–':>12}  "
+"""In place of the seconds of a row, where nobody knows when anything came."""
+
+
 def text_line(item: JudgedRow, dissector: Dissector, session: Session, colour: bool = False, title: str = "") -> str:
     """One line for people: number, seconds since the start, what it is, verdict and response time, doubts. `title`: of
     its protocol, where that is not the bus's."""
     row, transaction = item.row, item.transaction
-    seconds = since_start(row.event.start, session) / NS_PER_S
+    seconds = f"{since_start(row.event.start, session) / NS_PER_S:12.6f} s" if session.has_times else NO_TIME
     notes: list[str] = []
     bad = is_error(row)
     if row.event.marks:
@@ -184,9 +191,7 @@ def text_line(item: JudgedRow, dissector: Dissector, session: Session, colour: b
         text = f"{text}: {shown}{' …' if len(row.event.octets) > 16 else ''}"
     elif not row.event.ok and row.header is not None and row.header.error and row.header.error not in text:
         notes.insert(0, row.header.error)
-    line = (
-        f"{row.no:>6} {seconds:12.6f} s  {'!' if bad else ' '} {text}{'  [' + '; '.join(notes) + ']' if notes else ''}"
-    )
+    line = f"{row.no:>6} {seconds}  {'!' if bad else ' '} {text}{'  [' + '; '.join(notes) + ']' if notes else ''}"
     return f"\x1b[31m{line}\x1b[0m" if colour and bad else line
 
 

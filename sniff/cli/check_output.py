@@ -55,8 +55,8 @@ class Checked:
         return replace(self, findings=findings)
 
     def start(self, no: int) -> int | None:
-        """When a frame began, ns since the epoch."""
-        return self.starts[no - 1] if 0 < no <= len(self.starts) else None
+        """When a frame began, ns since the epoch; None where nobody knows."""
+        return self.starts[no - 1] if 0 < no <= len(self.starts) and self.session.has_times else None
 
 
 def as_site(name: str, buses: Sequence[Checked]) -> list[Checked]:
@@ -118,7 +118,9 @@ def write_text(checked: Sequence[Checked], colour: bool) -> None:
 
 def _write_head(one: Checked, width: int) -> None:
     session = one.session
-    heard = f"{_span(one.seconds)}, {one.frames} frames"
+    heard = f"{one.frames} frames"
+    if one.session.has_times:
+        heard = f"{_span(one.seconds)}, {heard}"
     if one.buses:
         print(f"{sanitized(one.source)}: {sanitized(', '.join(one.buses))} together, {heard}")
         return
@@ -233,8 +235,8 @@ def write_json(checked: Sequence[Checked]) -> None:
 
 
 def to_json(one: Checked, finding: Finding) -> dict[str, object]:
-    """One finding; times both as ISO 8601 and as ns since the capture's start."""
-    started = one.session.started
+    """One finding; times both as ISO 8601 and as ns since the capture's start, null where nobody knows them."""
+    started, has_times = one.session.started, one.session.has_times
     return {
         "source": one.source,
         "code": finding.code,
@@ -242,10 +244,10 @@ def to_json(one: Checked, finding: Finding) -> dict[str, object]:
         "title": _title(one, finding),
         "subject": finding.subject,
         "count": finding.count,
-        "first": iso(finding.first),
-        "last": iso(finding.last),
-        "first_ns": finding.first - started,
-        "last_ns": finding.last - started,
+        "first": iso(finding.first) if has_times else None,
+        "last": iso(finding.last) if has_times else None,
+        "first_ns": finding.first - started if has_times else None,
+        "last_ns": finding.last - started if has_times else None,
         "frames": [
             {"no": no, "start_ns": None if (start := one.start(no)) is None else start - started}
             for no in finding.evidence

@@ -182,9 +182,8 @@ def _print(
     if summary.searched or session.unknown:
         _line("search", _search(session, summary, events))
     _line("port", session.port or "unknown")
-    _line(
-        "adapter", f"{adapter.name}; holds octets back up to {milliseconds(adapter.latency)} ({adapter.latency_from})"
-    )
+    held = f"; holds octets back up to {milliseconds(adapter.latency)} ({adapter.latency_from})"
+    _line("adapter", adapter.name + (held if session.has_times else ""))
     reports = "unknown" if adapter.reports is None else ", ".join(adapter.reports) or "none (zero errors mean nothing)"
     _line("reports", f"line errors: {reports}{'; ' + adapter.detail if adapter.detail else ''}")
     searched = f"{summary.searched} of them while searching, " if summary.searched else ""

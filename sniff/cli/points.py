@@ -62,6 +62,9 @@ _SELDOM = ("unit", "written")
 FRESH = 2.0
 """Seconds for which a change is marked on a terminal."""
 
+OF_TIME = frozenset(("time", "age s", "changed s", "every ms", "± ms", "a second"))
+"""Columns that a capture without times does not know."""
+
 SAMPLES = ("time", "device", "point", "value", "raw", "unit", "quality", "how", "frame", "means")
 
 
@@ -108,7 +111,7 @@ def run(args: argparse.Namespace) -> int:
             session = arguments.settings_of(args, capture.session, name)
             for samples in _chosen(args, capture, session):
                 for sample in samples.in_order():
-                    table.add([*first, *sample_row(sample)])
+                    table.add([*first, *(sample_row(sample) if session.has_times else [None, *sample_row(sample)[1:]])])
             say_incomplete(name, capture)
     return 0
 
@@ -127,6 +130,11 @@ def _print(args: argparse.Namespace) -> int:
             cells: Iterable[tuple[Cell, ...]] = _latest_of(args, capture, session)
         else:
             cells = (cells for samples in _chosen(args, capture, session) for cells in _cells(samples))
+        if not session.has_times:
+            cells = [
+                tuple(None if name in OF_TIME else cell for name, cell in zip(headings, row, strict=True))
+                for row in cells
+            ]
         if growing is not None:
             growing.add((path, *row) for row in cells) if first else growing.add(cells)
         elif latest:

@@ -90,8 +90,8 @@ def _row(poll: Poll, asks: str, changed: str, brief: bool, has_times: bool) -> t
         poll.late,
         poll.damaged,
         poll.repeats,
-        None if poll.first is None else clock(poll.first),
-        None if poll.last is None else clock(poll.last),
+        clock(poll.first) if has_times and poll.first is not None else None,
+        clock(poll.last) if has_times and poll.last is not None else None,
         changed,
     )
 

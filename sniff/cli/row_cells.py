@@ -162,6 +162,8 @@ class RowCells:
 
     def t(self, some: _Some, _: str) -> list[Column]:
         """Instants."""
+        if not self._session.has_times:
+            return [self._none]
         times = some.settled.table.frames.start[some.places]
         seconds = times // NS_PER_S
         first = int(seconds.min(initial=0 if not len(seconds) else seconds[0]))
@@ -173,6 +175,8 @@ class RowCells:
 
     def since(self, some: _Some, name: str) -> list[Column]:
         """ns since the capture's start."""
+        if not self._session.has_times:
+            return [self._none]
         frames = some.settled.table.frames
         times = (frames.start if name == "start_ns" else frames.end)[some.places]
         return [digits(since(times, self._session.started))]

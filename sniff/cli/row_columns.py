@@ -86,7 +86,7 @@ class RowColumns:
         values: dict[str, Cell] = {}
         if any(name in rows.JSON_KEYS for name in names):
             values = rows.to_json(item, self._dissector, self._session)
-            if instants:
+            if instants and self._session.has_times:
                 values["t"] = item.row.event.start
         if any(name not in rows.JSON_KEYS for name in names):
             values = {**values, **rows.fields_of(item, self._dissector)}
@@ -100,6 +100,8 @@ class RowColumns:
         if name in ("no", "frame.number"):
             cells: list[Cell] = (at + table.first).tolist()
             return cells
+        if name in ("t", "start_ns", "end_ns") and not self._session.has_times:
+            return [render(None)] * len(places)
         if name == "t":
             starts = table.frames.start[at]
             return starts.tolist() if instants else [render(f"{one}Z") for one in _isos(starts)]

@@ -48,12 +48,17 @@ class RowLines:
         bad |= np.array([trouble for trouble, _ in noted] or [False], bool)[notes]
         columns: list[Column] = [
             *([Chosen.of([b"", b"\x1b[31m"], bad.view(np.uint8))] if self._colour else []),
-            digits(places + table.first, 6), b" ", digits(micros // _US // _US, 5), b".",
-            fixed_digits(micros % (_US * _US), 6), b" s  ", Chosen.of([b"  ", b"! "], bad.view(np.uint8)),
-            texts, self._noted(notes, told, [note for _, note in noted]),
+            digits(places + table.first, 6), b" ", *self._seconds(micros.astype(np.int64)), b"  ",
+            Chosen.of([b"  ", b"! "], bad.view(np.uint8)), texts, self._noted(notes, told, [note for _, note in noted]),
             *([Chosen.of([b"\n", b"\x1b[0m\n"], bad.view(np.uint8))] if self._colour else [b"\n"]),
         ]  # fmt: skip
         return pieced(merged(columns), alone, lambda at: self._alone(settled, int(places[at])))
+
+    def _seconds(self, micros: Times) -> list[Column]:
+        """Seconds with microseconds, from them."""
+        if not self._session.has_times:
+            return [encoded(rows.NO_TIME)]
+        return [digits(micros // _US // _US, 5), b".", fixed_digits(micros % (_US * _US), 6), b" s"]
 
     def _alone(self, settled: SettledRows, place: int) -> bytes:
         line = rows.text_line(settled.item(place), self._dissector, self._session, self._colour)

@@ -161,7 +161,7 @@ def _show(
             title = dissector.title if dissector is not usual else ""
             print(rows.text_line(item, dissector, session, colour, title))
             if args.tree:
-                print(_tree(item, dissector))
+                print(_tree(item, dissector, session))
             if args.hex:
                 print(rows.hex_dump(item.row.event.octets))
         if left == 0:
@@ -253,10 +253,11 @@ def _cells(
     ]
 
 
-def _tree(item: JudgedRow, dissector: Dissector) -> str:
+def _tree(item: JudgedRow, dissector: Dissector, session: Session) -> str:
     from sniff.analysis.row_tree import tree_of  # with what takes packets apart
 
-    return "\n".join(_tree_lines(tree_of(dissector, item.row, item.transaction, rows.iso, item.meaning), "        "))
+    time_text = rows.iso if session.has_times else None
+    return "\n".join(_tree_lines(tree_of(dissector, item.row, item.transaction, time_text, item.meaning), "        "))
 
 
 def _tree_lines(fields: Iterable[Field], indent: str) -> Iterator[str]:

@@ -144,6 +144,8 @@ def _write(args: argparse.Namespace, table: str, summary: Summary, kinds: _Kinds
         rows = [(node.address, *_quantiles(node.latency)) for node in summary.nodes if node.latency.count]
         bound = session.adapter.latency / MS
         tables.write(LATENCY_HEADINGS, [(*row, bound) for row in rows], args.style)
+    elif not session.has_times:
+        raise Failure("load: this capture does not say when anything came", USAGE)
     else:
         tables.write(LOAD_HEADINGS, _load(summary, int((args.every or 1) * NS_PER_S)), args.style)
 

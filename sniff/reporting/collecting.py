@@ -88,7 +88,7 @@ def collect(
     )
     found = _found(findings, _words(read, session, dissector, findings, reference), session, dissector)
     load = summary.load
-    return CaptureNumbers(
+    numbers = CaptureNumbers(
         source=source,
         title=dissector.title,
         verdict=verdict(health, found, stations, summary),
@@ -118,6 +118,7 @@ def collect(
         ring=None if dissector.ring is None else _ring(dissector.ring, model.ring()),
         values=tuple(_value(trend, session) for trend in trends.moved(VALUES_SHOWN)),
     )
+    return numbers if session.has_times else numbers.without_times()
 
 
 def _value(trend: Trend, session: Session) -> ValueTrend:
@@ -274,7 +275,9 @@ def _cut(text: str) -> str:
 def _measurement(session: Session, dissector: Dissector) -> Measurement:
     adapter = session.adapter
     limits = []
-    if adapter.latency:
+    if not session.has_times:
+        limits.append("When anything came is not known: nothing is said of response times, load or rounds.")
+    elif adapter.latency:
         limits.append(
             f"The adapter may hold octets back for {milliseconds(adapter.latency)} ({adapter.latency_from}): "
             "every response time is known only to that."

@@ -6,7 +6,7 @@ Durations are ms, times seconds since the capture's start, shares 0 … 1, unles
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from dissectors.histogram import Histogram
@@ -42,8 +42,8 @@ class FindingRow:
     title: str
     subject: str
     count: int
-    first: float
-    last: float
+    first: float | None
+    last: float | None
     seen: str
     means: str
     next: str
@@ -186,7 +186,7 @@ class CaptureNumbers:
     noise_octets: int
     frames: int
     damaged: int
-    load: float
+    load: float | None
     findings: tuple[FindingRow, ...]
     stations: tuple[StationNumbers, ...]
     polled_only: tuple[int, ...]
@@ -201,6 +201,16 @@ class CaptureNumbers:
     measurement: Measurement
     ring: RingNumbers | None = field(default=None)
     values: tuple[ValueTrend, ...] = ()
+
+    def without_times(self) -> CaptureNumbers:
+        """The same of a capture that does not say when anything came."""
+        findings = tuple(
+            replace(one, first=None, last=None, evidence=tuple(replace(row, at=None) for row in one.evidence))
+            for one in self.findings
+        )
+        return replace(
+            self, first=None, last=None, seconds=0.0, load=None, findings=findings, part=0.0, timeline=(), values=()
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Plain values, keys in the order of the fields; the keys are a promise."""

@@ -42,7 +42,7 @@ class StoreList(LineList):
             width,
             verdict=15 if width >= WIDE else 9,
             latency=0 if width < NO_LATENCY and not names else max(LATENCY, len(latency)),
-            time=0 if width < NO_TIME and not names else 12,
+            time=0 if (width < NO_TIME and not names) or not self.store.session.has_times else 12,
             **{self.COLUMNS[0].name: max(4, len(str(self.index.last)) + 1)},  # the signs at the edge stand apart
         )
         return [replace(column, title=titles.get(column.name, column.title)) for column in shown]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -178,10 +178,13 @@ class FramesScreen(ListingScreen):
             return
         row, transaction = self._detail
         octets.show(row.no, row.event.octets, row.event.marks)
-        fields = tree_of(self.store.dissector, row, transaction, date_and_clock, self.store.meaning(row))
+        fields = tree_of(self.store.dissector, row, transaction, self._time_text(), self.store.meaning(row))
         kept = tree.show((*self._foreign_fields(row), *fields))
         if kept is not None:
             octets.select(kept.begin, kept.end, kept.name)
+
+    def _time_text(self) -> Callable[[int], str] | None:
+        return date_and_clock if self.store.session.has_times else None
 
     def _foreign_fields(self, row: Row) -> tuple[Field, ...]:
         """Fields of frames of a second protocol in a row of the first, at their octets where they are whole in it."""
@@ -192,7 +195,7 @@ class FramesScreen(ListingScreen):
         for one in found:
             assert foreign is not None
             at = row.event.octets.find(one.event.octets, after)
-            made += [moved(field, at) for field in tree_of(foreign.second, one, None, date_and_clock, None)]
+            made += [moved(field, at) for field in tree_of(foreign.second, one, None, self._time_text(), None)]
             after = max(after, at + len(one.event.octets))
         return tuple(made)
 

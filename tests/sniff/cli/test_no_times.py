@@ -1,0 +1,77 @@
+"""Of a log that does not say when anything came nothing is said of time, in any form."""
+
+from __future__ import annotations
+
+import csv
+import importlib.util
+import io
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import sniff
+from tests.sniff.cli.conftest import Ran
+
+LOG = "01 03 00 00 00 02 C4 0B\n01 03 04 00 01 00 02 2A 32\n" * 8
+Run = Callable[..., Ran]
+
+
+@pytest.fixture(params=["log", "mcap"])
+def log(request: pytest.FixtureRequest, tmp_path: Path, sniff485: Run) -> Path:
+    """As it was written, and converted."""
+    written = tmp_path / "bare.log"
+    written.write_text(LOG)
+    if request.param == "mcap":
+        assert sniff485("convert", written, tmp_path / "bare.mcap").code == 0
+    return tmp_path / f"bare.{request.param}"
+
+
+@pytest.mark.parametrize("more", [(), ("--reference",), ("-V",)])
+def test_lines_have_no_seconds(more: tuple[str, ...], log: Path, sniff485: Run) -> None:
+    out = sniff485("show", log, *more).out
+    assert out.splitlines()[0].split()[:3] == ["1", "–", "1"]
+    assert not re.search(r"\d\.\d{6} s|1970", out)
+
+
+def test_frames_as_json_and_csv_have_no_instants(log: Path, sniff485: Run) -> None:
+    for more in ((), ("--reference",)):
+        rows = [json.loads(line) for line in sniff485("show", "--json", log, *more).out.splitlines()]
+        assert len(rows) == 16
+        assert {(row["t"], row["start_ns"], row["end_ns"], row["latency_ms"]) for row in rows} == {(None,) * 4}
+        table = list(csv.DictReader(io.StringIO(sniff485("show", "--csv", log, *more).out)))
+        assert {(row["t"], row["start_ns"], row["end_ns"]) for row in table} == {("",) * 3}
+
+
+def test_findings_have_no_instants(log: Path, sniff485: Run) -> None:
+    found = [json.loads(line) for line in sniff485("check", "--json", log).out.splitlines()]
+    assert found
+    assert {(one["first"], one["last"], one["first_ns"], one["last_ns"]) for one in found} == {(None,) * 4}
+    assert re.search(r": modbus-rtu, .*, 16 frames", sniff485("check", log).out.splitlines()[0])
+
+
+def test_values_have_no_ages(log: Path, sniff485: Run) -> None:
+    latest = [json.loads(line) for line in sniff485("points", "--latest", "--json", log).out.splitlines()]
+    assert {one[name] for one in latest for name in ("age s", "changed s", "every ms", "± ms", "a second")} == {None}
+    assert {one["samples"] for one in latest} == {8}
+    every = [json.loads(line) for line in sniff485("points", "--json", log).out.splitlines()]
+    assert {one["time"] for one in every} == {None}
+    polls = [json.loads(line) for line in sniff485("stats", "polls", "--json", log).out.splitlines()]
+    assert {one[name] for one in polls for name in ("every ms", "± ms", "first", "last")} == {None}
+
+
+def test_load_is_refused(log: Path, sniff485: Run) -> None:
+    ran = sniff485("stats", "load", log)
+    assert (ran.code, ran.out) == (2, "")
+    assert "does not say when anything came" in ran.err
+
+
+@pytest.mark.skipif(importlib.util.find_spec("polars") is None, reason="needs polars, the extra frames")
+def test_data_frames_have_nulls(log: Path) -> None:
+    capture = sniff.read(log)
+    for frame in (capture.frames(), capture.transactions(), capture.values()):
+        names = {"t", "time", "time_ns", "start_ns", "end_ns"} & {*frame.columns}
+        assert names
+        assert all(frame[name].null_count() == len(frame) > 0 for name in names)
