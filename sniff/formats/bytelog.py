@@ -30,13 +30,14 @@ from sniff.engine.capture import CaptureError
 from sniff.engine.session import NO_TIMES, Adapter, Completeness, Item, LineEvent, Session
 from sniff.formats.contents import utf16_of
 from sniff.formats.files import explain, open_capture
-from sniff.formats.log_assembly import LINE_END, SLOW, Assembly
+from sniff.formats.log_assembly import Assembly
 from sniff.formats.log_lines import Kind, pieces
 from sniff.formats.log_margin import plain_signs
 from sniff.formats.log_plan import LOOKED_AT, LOOKED_AT_CHARACTERS, Plan, plan_of
 from sniff.formats.log_shapes import DECODED, REMARK
 from sniff.formats.octet_table import TableLayout, delimiter_of, heading_of
 from sniff.formats.records import FOREIGN_LATENCY, foreign_session
+from sniff.formats.timeless import LINE_END, SLOW
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block

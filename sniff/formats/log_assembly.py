@@ -15,16 +15,10 @@ from sniff.formats.log_packets import carried
 from sniff.formats.log_plan import WINDOW, Plan
 from sniff.formats.log_shapes import Role
 from sniff.formats.table_cells import MOST
-
-LINE_END = 10 * MS
-"""Silence that stands for the end of a line where nobody says how long it was: longer than the gap between frames at
-the usual rates, shorter than what an adapter may hold back, so that it is no proof of two frames."""
+from sniff.formats.timeless import LINE_END, SLOW
 
 COARSE = 2 * MS
 """A clock that counts so, or in longer steps, does not tell which octets came together."""
-
-SLOW = LineSettings.parse("9600,8E1")
-"""Octets without times are laid so far apart at least, so that they do not lie over one another at a usual rate."""
 
 LONGEST = 4096
 """Octets put together from several lines; what goes on after them is the next read, without a silence."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -19,8 +20,9 @@ from sniff.engine.session import Completeness, Item, LineEvent, LineEventKind, S
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, USER1
 from sniff.formats.network import NETWORK
-from sniff.formats.pcapng_interface import Interface
+from sniff.formats.pcapng_interface import OPT_END, OPT_TSRESOL, Interface, interface_of, options
 from sniff.formats.records import PacketRecord, SearchMarks, cut_off, foreign_session, items_of, protocol_of
+from sniff.formats.timeless import IN_PACKETS, Laid
 from sniff.formats.usb import USB
 
 if TYPE_CHECKING:
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
 
 SECTION, INTERFACE, OBSOLETE, SIMPLE, ENHANCED = 0x0A0D0D0A, 1, 2, 3, 6
 BYTE_ORDER = 0x1A2B3C4D
-OPT_END, OPT_COMMENT, OPT_NAME, OPT_FLAGS, OPT_TSRESOL, OPT_TSOFFSET = 0, 1, 2, 2, 9, 14
+OPT_COMMENT, OPT_NAME, OPT_FLAGS = 1, 2, 2
 CRC_ERROR_FLAG = 1 << 24
 LONGEST = 4 * 1024 * 1024
 """A longer block is damage."""
@@ -68,6 +70,8 @@ class PcapngCapture:
         self._metadata: dict[str, str] = {}
         self._other = 0
         self._of_network = self._of_usb = 0
+        self._laid = Laid()
+        self._is_timeless = False
         with open_capture(path) as stream:
             first = self._first(stream)
         self._is_without_frames = first is None
@@ -76,6 +80,11 @@ class PcapngCapture:
         else:
             protocol = protocol_of(first) if first is not None else None
             self.session = foreign_session(str(path), protocol, first.time if first is not None else 0, "pcapng")
+        if self._is_timeless:
+            unknown = replace(
+                self.session.adapter, latency=IN_PACKETS, latency_from="assumed; its packets have no times"
+            )
+            self.session = replace(self.session, adapter=unknown)
 
     def _first(self, stream: BinaryIO) -> PacketRecord | None:
         start = stream.read(12)
@@ -165,6 +174,7 @@ class PcapngCapture:
         from sniff.formats.pcapng_walk import OtherBlock, PcapngWalk
 
         self._other = 0
+        self._laid = Laid()
         marks = SearchMarks(self.session)
         interfaces: list[Interface] = []
         with open_capture(self.path) as stream:
@@ -202,6 +212,7 @@ class PcapngCapture:
 
     def _records(self, stream: BinaryIO) -> Iterator[PacketRecord]:
         self._complete = Completeness(True)
+        self._laid = Laid()
         interfaces: list[Interface] = []
         for order, kind, body in self._blocks(stream):
             record = self._record(order, kind, body, interfaces)
@@ -214,9 +225,13 @@ class PcapngCapture:
             interfaces.clear()
             self._take_session(order, body)
         elif kind == INTERFACE and len(body) >= 8:
-            interfaces.append(_interface(order, body))
+            interfaces.append(interface_of(order, body))
         elif kind in (ENHANCED, SIMPLE, OBSOLETE):
-            return _packet(order, kind, body, interfaces)
+            record = _packet(order, kind, body, interfaces)
+            if record is not None and kind == SIMPLE:
+                self._is_timeless = True
+                return replace(record, time=self._laid.end_of(len(record.data)))
+            return record
         return None
 
     def _blocks(self, stream: BinaryIO, order: str = "<") -> Iterator[tuple[str, int, bytes]]:
@@ -246,7 +261,7 @@ class PcapngCapture:
             yield order, kind, body[:-4]
 
     def _take_session(self, order: str, body: bytes) -> None:
-        for code, value in _options(order, body[16:]):
+        for code, value in options(order, body[16:]):
             text = value.decode("utf-8", "replace")
             if code == OPT_COMMENT and text.startswith(SESSION_MARK):
                 try:
@@ -255,19 +270,6 @@ class PcapngCapture:
                     continue
                 if isinstance(found, dict):
                     self._metadata = {str(key): str(item) for key, item in found.items()}
-
-
-def _interface(order: str, body: bytes) -> Interface:
-    resolution, offset = (1000, 1), 0
-    for code, value in _options(order, body[8:]):
-        if code == OPT_TSRESOL and value:
-            power = value[0] & 0x7F
-            ticks = 2**power if value[0] & 0x80 else 10 ** min(power, 30)
-            resolution = (1_000_000_000, ticks)
-        elif code == OPT_TSOFFSET and len(value) == 8:
-            offset = struct.unpack(order + "q", value)[0]
-    link_type, longest = struct.unpack_from(order + "HxxI", body)
-    return Interface(link_type, resolution, offset, longest or LONGEST)
 
 
 def _packet(order: str, kind: int, body: bytes, interfaces: list[Interface]) -> PacketRecord | None:
@@ -289,7 +291,7 @@ def _packet(order: str, kind: int, body: bytes, interfaces: list[Interface]) -> 
     time = ((high << 32) | low) * factor // ticks + interface.offset * 1_000_000_000
     time = max(-LATEST, min(time, LATEST))
     comment, crc_error, searched, mark = "", False, None, None
-    for code, value in _options(order, body[20 + kept + (-kept % 4) :]):
+    for code, value in options(order, body[20 + kept + (-kept % 4) :]):
         if code == OPT_COMMENT:
             text = value.decode("utf-8", "replace")
             if text.startswith(SEARCH_MARK):
@@ -311,16 +313,6 @@ def _line(text: str) -> LineSettings | None:
         return LineSettings.parse(text)
     except ValueError:
         return None
-
-
-def _options(order: str, data: bytes) -> Iterator[tuple[int, bytes]]:
-    at = 0
-    while at + 4 <= len(data):
-        code, size = struct.unpack_from(order + "HH", data, at)
-        if code == OPT_END or at + 4 + size > len(data):
-            return
-        yield code, data[at + 4 : at + 4 + size]
-        at += 4 + size + (-size % 4)
 
 
 def create(path: Path, session: Session, link_type: int, live: bool = False) -> PcapngWriter:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -132,3 +133,14 @@ def test_a_hole_is_told_before_the_rows_that_it_ends(tmp_path: Path) -> None:
         model = BusModel(capture.session, registry.get("modbus-rtu"), Devices())
         survey(capture, capture.session, model, reference=reference)
         assert "MB005" not in {one.code for one in model.findings()}
+
+
+def test_packets_without_times_say_nothing_of_response_times(tmp_path: Path) -> None:
+    path = tmp_path / "x.pcapng"
+    path.write_bytes(_pcapng(SIMPLE))
+    capture = read(path)
+    times = [item.time for item in capture.items()]
+    assert all(later > earlier for earlier, later in pairwise(times))
+    assert [item.reads.times.tolist() for item in capture.blocks() if isinstance(item, Block)] == [times]
+    assert "no times" in capture.session.adapter.latency_from
+    assert capture.session.adapter.latency > 300_000_000
