@@ -23,7 +23,7 @@ from itertools import pairwise
 
 from dissectors.frame import Chunk, LineError, Mark
 from sniff.formats.log_times import AS_WRITTEN, UNIT_NAMES, Times, is_count, order_of, unit_of
-from sniff.formats.table_cells import MOST, UNITS, fits, octets_of, spelling_of, time_of
+from sniff.formats.table_cells import DIGITS, MOST, UNITS, fits, octets_of, spelling_of, time_of
 
 OCTET = (
     "octet",
@@ -359,7 +359,7 @@ def _times_of(cells: Sequence[str], lengths: Sequence[int], named: str) -> tuple
             number = Decimal(cell.replace(",", "."))
         except InvalidOperation:
             continue
-        if number.is_finite() and length:
+        if number.is_finite() and number.adjusted() <= DIGITS and length:
             numbers.append(number)
             of_them.append(length)
     if 2 * len(numbers) < len(cells) or len(numbers) < 2:

@@ -228,7 +228,10 @@ def _limits(voltages: npt.NDArray[np.float64]) -> tuple[float, float]:
 
 def _is_even(times: Iterable[float]) -> bool:
     """Whether numbers rise by the same each time, as far as their digits say it."""
-    steps = np.diff(np.array(list(times)))
+    numbers = np.array(list(times))
+    if not np.isfinite(numbers).all():
+        return False
+    steps = np.diff(numbers)
     mean = float(steps.mean()) if len(steps) else 0.0
     return mean > 0 and bool((steps >= 0).all()) and bool((np.abs(steps - mean) <= _EVEN * mean).all())
 

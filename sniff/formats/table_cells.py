@@ -130,12 +130,16 @@ def seconds(text: str) -> int:
     return scaled(text, UNITS["s"])
 
 
+DIGITS = 40
+"""With more of them before its point a number is none; with a million of them nothing can be reckoned with it."""
+
+
 def scaled(text: str, unit: int) -> int:
     """A decimal number of `unit`s (ns) → ns, exactly. Raises ValueError."""
     try:
         number = Decimal(text.strip().replace(",", "."))
     except InvalidOperation:
         raise ValueError(f"time {text[:20]!r}: expected seconds") from None
-    if not number.is_finite() or abs(number) * unit > LATEST * UNITS["s"]:
+    if not number.is_finite() or number.adjusted() > DIGITS or abs(number) * unit > LATEST * UNITS["s"]:
         raise ValueError(f"time {text[:20]!r}: expected seconds, less than {LATEST}")
     return int(number * unit)

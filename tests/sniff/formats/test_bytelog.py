@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import pytest
@@ -167,3 +168,14 @@ def test_a_table_too_long_for_memory_is_refused(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(bytelog, "MOST_ROWS", 49)
     with pytest.raises(CaptureError, match="over 49 rows; cut it into pieces"):
         bytelog.read(path)
+
+
+@pytest.mark.parametrize("time", ["1e999999", "-9e999999", "9e999999999", "1e-999999", "nan", "-inf"])
+@pytest.mark.parametrize("heading", ["Time [s],Channel 0", "time,data", "a,b", "Time [s],Value,Parity Error"])
+def test_times_of_tables_that_no_clock_tells(heading: str, time: str, tmp_path: Path) -> None:
+    rows = [f"0.{at:03},{at % 2}" for at in range(40)]
+    rows[20:20] = [f"{time},1", f"{time.replace('-', '')},1", f"-{time.replace('-', '')},0"]
+    path = tmp_path / "x.csv"
+    path.write_text("\n".join([heading, *rows]))
+    with contextlib.suppress(CaptureError):
+        list(read(path).items())
