@@ -62,6 +62,7 @@ INFERRED = "inferred from the reads"
 """Where a latency is from that nobody said."""
 
 NO_TIMES = "assumed; the log has no times"
+NO_TIMES_OF_PACKETS = "assumed; its packets have no times"
 """Where the latency of a capture is from that says of nothing when it came."""
 
 UNNAMED = ("assumed", "unknown", "")
@@ -145,7 +146,7 @@ class Session:
     @property
     def has_times(self) -> bool:
         """Whether the capture says when anything came; where not, its octets are laid one behind the other."""
-        return self.adapter.latency_from != NO_TIMES
+        return self.adapter.latency_from not in (NO_TIMES, NO_TIMES_OF_PACKETS)
 
     def found(self, line: LineSettings | None, protocol: str | None) -> Session:
         """The session once its search has ended with these settings."""

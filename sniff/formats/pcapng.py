@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from dissectors.line import LineSettings
 from sniff.engine.capture import Capture, CaptureError
-from sniff.engine.session import Completeness, Item, LineEvent, LineEventKind, Session
+from sniff.engine.session import NO_TIMES_OF_PACKETS, Completeness, Item, LineEvent, LineEventKind, Session
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, USER1
 from sniff.formats.network import NETWORK
@@ -81,9 +81,7 @@ class PcapngCapture:
             protocol = protocol_of(first) if first is not None else None
             self.session = foreign_session(str(path), protocol, first.time if first is not None else 0, "pcapng")
         if self._is_timeless:
-            unknown = replace(
-                self.session.adapter, latency=IN_PACKETS, latency_from="assumed; its packets have no times"
-            )
+            unknown = replace(self.session.adapter, latency=IN_PACKETS, latency_from=NO_TIMES_OF_PACKETS)
             self.session = replace(self.session, adapter=unknown)
 
     def _first(self, stream: BinaryIO) -> PacketRecord | None:
