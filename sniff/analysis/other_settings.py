@@ -181,12 +181,19 @@ def _by_rate(sample: Sequence[Chunk], line: LineSettings, has_rate: bool) -> Ite
 def _too_short(bursts: Sequence[bytes]) -> bool:
     """Whether the same bursts come again and again, and nearly all are too short for a frame.
 
-    Noise does not repeat itself, and an octet that is always the same may be the ringing of a driver: so there must be
-    two octets or more, and two kinds of bursts.
+    Noise does not repeat itself, and an octet that is always the same may be the ringing of a driver: so some bursts
+    must be of two octets or more, and there must be two kinds of bursts. Where answers differ each time, requests do
+    not: then a good part of the bursts, but not nearly all, come again and again, and none is a single octet.
     """
-    often = {burst: count for burst, count in Counter(bursts).items() if count >= 3 and len(burst) >= 2}
+    often = {burst: count for burst, count in Counter(bursts).items() if count >= 3}
+    mixed = sum(count for burst, count in often.items() if len(set(burst)) >= 2)
     short = sum(len(burst) < 4 for burst in bursts)
-    return len(bursts) >= 8 and len(often) >= 2 and sum(often.values()) >= 0.7 * len(bursts) <= short
+    if len(bursts) < 8 or not mixed or short < 0.7 * len(bursts):
+        return False
+    if len(often) >= 2 and sum(often.values()) >= 0.7 * len(bursts):
+        return True
+    answers_differ = len(set(bursts)) >= 4 and min(map(len, bursts)) >= 2
+    return answers_differ and 0.4 * len(bursts) <= mixed <= 0.6 * len(bursts)
 
 
 def _bursts(sample: Sequence[Chunk], line: LineSettings, silence: int) -> list[bytes]:

@@ -127,4 +127,8 @@ def _stray_finding(
     if 2 * sum(count for _, count in most) > sum(count for _, count in counts):
         mostly = "" if len(counts) == len(most) else "mostly "
         words += f" ({mostly}{', '.join(f'{value:02X}' for value, _ in most)})"
-    return tally.found(RULES[code], name, words, note_if(tally.count, frames))
+    finding = tally.found(RULES[code], name, words, note_if(tally.count, frames))
+    if frames:
+        return finding
+    means = f"a bus that is much faster than the port, of whose frames no more is heard; or {finding.means}"
+    return replace(finding, means=means, next=f"`detect`, or higher rates (-s); then {finding.next}")

@@ -98,6 +98,23 @@ def test_a_much_faster_bus() -> None:
     assert "wrong baud rate: the bus is faster than 9600 Bd" in told.seen
 
 
+@pytest.mark.parametrize(("bus", "port"), [("115200", "19200"), ("38400", "4800"), ("57600", "9600")])
+def test_a_much_faster_bus_whose_answers_differ(bus: str, port: str) -> None:
+    answers = [seal_rtu(bytes((1, 3, 4, 0, turn * 7, 0, 1))) for turn in range(14)]
+    sent = [one for answer in answers for one in (polls(1)[0], answer)]
+    told = fit(heard(sent, f"{bus},8N1", f"{port},8N1"), "modbus-rtu", LineSettings.parse(f"{port},8N1"))
+    assert told is not None
+    assert f"wrong baud rate: the bus is faster than {port} Bd" in told.seen
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_of_noise_of_one_or_two_octets_nothing_is_said(seed: int) -> None:
+    """Half of it always the same, as a driver rings."""
+    dice = random.Random(seed)
+    rest = [dice.randbytes(dice.randrange(1, 3)) for _ in range(20)]
+    assert fit([one for other in rest for one in (b"\xfe\xff", other)], "modbus-rtu") is None
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_of_noise_nothing_is_said(seed: int) -> None:
     dice = random.Random(seed)
