@@ -11,7 +11,7 @@ from typing import NamedTuple
 from dissectors.chances import is_rare
 from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, found, times
 from dissectors.frame import Chunk, Damage, Event, Flaw, Frame, LineError, Noise, Place, Reason, Role
-from dissectors.line import MS, NS_PER_S
+from dissectors.line import MS, NS_PER_S, LineSettings
 from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction
 from dissectors.words import milliseconds
@@ -80,6 +80,7 @@ class LineFindings:
         self._use = LineUse(session.line)
         adapter = session.adapter
         self._senders = Senders(session.timing, adapter.packets)
+        self._is_of_text = LineSettings.parse((dissector or dissector_for(session)).default_line).data_bits == 7
         self._octets = self._in_frames = self._marked = self._low = self._rows = self._frames = self._good = 0
         self._mended: dict[Flaw, tuple[int, int]] = {}  # frames, and octets of them, that are good but for that
         self._first = self._now = session.started  # of a capture in which nothing was heard: when it began
@@ -252,7 +253,7 @@ class LineFindings:
             return
         of_damaged = noise.place is not Place.BETWEEN and not self._before_ok  # where a damaged frame ends nobody knows
         if len(noise.octets) > STRAY_MOST or of_damaged:
-            self._remains.add(no, noise)
+            self._remains.add(no, noise, None if self._asker is None else self._called_last)
             self._pieces.count_remains(len(noise.octets))
         elif noise.place is Place.BEFORE or (noise.place is Place.AFTER and self._asker is not None):
             self._pending.append(_Stray(no, noise, self._asker, self._called_last))
@@ -275,6 +276,8 @@ class LineFindings:
         return replace(heard, is_told=True) if heard.is_strange and self._other_settings() is not None else heard
 
     def _lacking_bits(self) -> Fit | None:
+        if self._has_seven_bits:
+            return None
         return lacking_bits(self._sample, self._session.line, self._values, self._damaged, self._rows)
 
     def judgement(self) -> Judgement:
@@ -365,7 +368,12 @@ class LineFindings:
             timing = session.timing
             fit = what_fits(self._sample, session.line, timing.latency, session.protocol, timing.has_rate)
             self._fit = self._sampled, fit
-        return fit
+        return None if fit is not None and fit.lacks_bits and self._has_seven_bits else fit
+
+    @property
+    def _has_seven_bits(self) -> bool:
+        """Whether the bus has no more: its protocol is one of text, and frames were good."""
+        return self._good >= MENDED_LEAST and self._is_of_text
 
     def _parity_setting(self) -> Finding:
         words = (
@@ -382,7 +390,7 @@ class LineFindings:
 
     def _of_bus(self) -> Iterator[Finding]:
         yield from self._senders.breaks_found(self._note_if)
-        rests = self._remains.found(self._octets)
+        rests = self._remains.found(self._octets, self._senders.by_name.keys() - {BUS, MASTER})
         for stray in strays_found(self._senders, self._instead, self._note_if):
             many = stray.code == "LN203" and stray.subject == BUS and self._remains.octets > OUTWEIGHED * stray.count
             is_part = rests is not None and rests.severity >= Severity.WARNING and many

@@ -38,11 +38,12 @@ _TEXT = frozenset(b"\r\n\t") | frozenset(range(0x20, 0x7F))
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """Settings that fit: what was seen, what it is consistent with, what to do."""
+    """Settings that fit: what was seen, what it is consistent with, what to do. `lacks_bits`: octets had more bits."""
 
     seen: str
     means: str
     next: str
+    lacks_bits: bool = False
 
 
 def what_fits(
@@ -146,6 +147,7 @@ def _by_values(sample: Sequence[Chunk], line: LineSettings) -> Iterator[Fit]:
         f"{seen}: they were received with {bits} data bits",
         f"{bits} data bits where the bus has 8, so that no check can agree; {port}",
         f"set 8 data bits (-s {LineSettings(line.baud, 8, line.parity, line.stop_bits)}) and record again",
+        lacks_bits=True,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import replace
 from typing import Final
 
@@ -12,6 +12,7 @@ from dissectors.frame import Chunk, Noise
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, other_protocol
 from sniff.analysis.slower_bus import slower_by
+from sniff.analysis.stray_findings import INSTEAD, INSTEAD_LEAST
 from sniff.engine.session import Session
 
 MOST_KEPT: Final = 16
@@ -36,10 +37,13 @@ class Remains:
         self._sample: list[Chunk] = []  # the same, to ask what else they may be
         self._sampled = 0
         self._fit: tuple[int, Fit | None] = (0, None)  # asked when so many octets were sampled
+        self._instead: Counter[str] = Counter()  # by whose answers were due
 
-    def add(self, no: int, noise: Noise) -> None:
-        """Take the next one."""
+    def add(self, no: int, noise: Noise, asked: str | None = None) -> None:
+        """Take the next one; `asked`: whose answer was due."""
         self._tally.add(noise.start, no)
+        if asked is not None and (asked in self._instead or len(self._instead) < MOST_KEPT):
+            self._instead[asked] += 1
         self.octets += len(noise.octets)
         if len(self._first) < MOST_KEPT and len(noise.octets) <= 300:
             self._first.append(noise.octets)
@@ -52,16 +56,23 @@ class Remains:
         self._tally.count -= len(newest)
         self.octets -= sum(newest)
 
-    def found(self, of_all: int) -> Finding | None:
-        """What there is to say so far. `of_all`: octets that were heard."""
+    def found(self, of_all: int, heard: Set[str] = frozenset()) -> Finding | None:
+        """What there is to say so far. `of_all`: octets that were heard; `heard`: stations that sent frames."""
         if not self._tally.count:
             return None
         share = self.octets / of_all
         stretches = counted(self._tally.count, "stretch", "stretches")
-        words = f"{self.octets} octets in {stretches} are no frame, {share:.1%} of all"
+        words = f"{self.octets} octets in {stretches} are no frame, {share:.1%} of all{self._of_one(heard)}"
         severity = None if share >= 0.02 and self._tally.count > 1 else Severity.NOTE
         finding = self._told(self._tally.found(RULES["LN204"], "bus", words, severity))
         return replace(finding, is_told_apart=True) if share >= MORE_THAN_REMAINS else finding
+
+    def _of_one(self, heard: Set[str]) -> str:
+        """Whose answers they stand for, where nearly all are one's of whom no frame is heard, though of others."""
+        ((name, count),) = self._instead.most_common(1) or (("", 0),)
+        if not heard or name in heard or count < max(INSTEAD_LEAST, INSTEAD * self._tally.count):
+            return ""
+        return f", {count} of them in place of the answers of {name}"
 
     def _told(self, finding: Finding) -> Finding:
         """With what the stretches have in common."""
