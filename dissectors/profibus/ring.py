@@ -57,13 +57,15 @@ class SlaveRow:
 
 @dataclass(frozen=True, slots=True)
 class Ring:
-    """`first`, `last`: ns, of what was seen. `wasted`: ns spent on polls that nobody answered."""
+    """`first`, `last`: ns, of what was seen. `wasted`: ns spent on polls that nobody answered. `has_times`: whether the
+    capture says when anything came; else all times are those of octets laid one behind the other."""
 
     masters: Mapping[int, MasterView] = field(default_factory=dict)
     slaves: Mapping[int, SlaveRow] = field(default_factory=dict)
     first: int = 0
     last: int = 0
     wasted: int = 0
+    has_times: bool = True
 
     @property
     def span(self) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dissectors.findings import counted
+from dissectors.histogram import Histogram
 from dissectors.line import MS, NS_PER_S
 from dissectors.token_ring import Cell
 
@@ -54,15 +55,13 @@ def rows(ring: Ring) -> list[tuple[Cell, ...]]:
 
 def _row(ring: Ring, address: int) -> tuple[Cell, ...]:
     view = ring.masters[address]
-    middle, most = view.rotation.quantile(0.5), view.rotation.quantile(1)
     return (
         address,
         view.following,
         view.tokens,
         view.repeats,
         view.claims,
-        None if middle is None else round(middle / MS, 2),
-        None if most is None else round(most / MS, 2),
+        *_middle_and_most(ring, view.rotation),
         view.requests,
         view.polls,
         view.answered,
@@ -71,18 +70,22 @@ def _row(ring: Ring, address: int) -> tuple[Cell, ...]:
 
 def slave_rows(ring: Ring) -> list[tuple[Cell, ...]]:
     """One row a slave, by address; those never heard of but asked for too."""
-    return [_slave_row(address, ring.slaves[address]) for address in sorted(ring.slaves)]
+    return [_slave_row(ring, address, ring.slaves[address]) for address in sorted(ring.slaves)]
 
 
-def _slave_row(address: int, slave: SlaveRow) -> tuple[Cell, ...]:
-    middle, most = slave.cycle.quantile(0.5), slave.cycle.quantile(1)
+def _middle_and_most(ring: Ring, times: Histogram) -> tuple[Cell, Cell]:
+    """ms, of half of them at most and of the longest; None where there are none, or nobody knows when anything came."""
+    middle, most = (times.quantile(0.5), times.quantile(1)) if ring.has_times else (None, None)
+    return None if middle is None else round(middle / MS, 2), None if most is None else round(most / MS, 2)
+
+
+def _slave_row(ring: Ring, address: int, slave: SlaveRow) -> tuple[Cell, ...]:
     counts = slave.counts
     return (
         address,
         slave.state.value,
         slave.exchanges,
-        None if middle is None else round(middle / MS, 2),
-        None if most is None else round(most / MS, 2),
+        *_middle_and_most(ring, slave.cycle),
         counts.lost,
         counts.syncs,
         counts.repeats,
@@ -97,15 +100,17 @@ def _slave_row(address: int, slave: SlaveRow) -> tuple[Cell, ...]:
 def sentences(ring: Ring) -> list[str]:
     """The ring as a whole, then each slave with its states and when it came into them."""
     order = ring.order
-    said = [
-        f"ring of {len(order)}: {' → '.join(map(str, (*order, order[0])))}" if order else "no closed ring seen",
-        f"GAP polls that nobody answers take {ring.wasted / ring.span if ring.span else 0:.1%} of the time",
-    ]
-    return said + [_slave(address, ring.slaves[address], ring.first) for address in sorted(ring.slaves)]
+    said = [f"ring of {len(order)}: {' → '.join(map(str, (*order, order[0])))}" if order else "no closed ring seen"]
+    if ring.has_times:
+        said.append(f"GAP polls that nobody answers take {ring.wasted / ring.span if ring.span else 0:.1%} of the time")
+    else:
+        said.append("when anything came is not known")
+    return said + [_slave(ring, address, ring.slaves[address]) for address in sorted(ring.slaves)]
 
 
-def _slave(address: int, slave: SlaveRow, first: int) -> str:
+def _slave(ring: Ring, address: int, slave: SlaveRow) -> str:
     steps = slave.changes[-_CHANGES_TOLD:]
-    told = ", ".join(f"{state.value} at {(time - first) / NS_PER_S:.3f} s" for time, state in steps)
+    at = [f" at {(time - ring.first) / NS_PER_S:.3f} s" if ring.has_times else "" for time, _ in steps]
+    told = ", ".join(f"{state.value}{when}" for when, (_, state) in zip(at, steps, strict=True))
     more = "… " if slave.changed > len(steps) else ""
     return f"slave {address}: {slave.state.value}, {counted(slave.exchanges, 'exchange')} of data ({more}{told})"

@@ -16,6 +16,10 @@ Points are taken off 100, never below 0:
       findings about the bus or its masters                   30 an error, 10 a warning     60
       and it is never better than half way between 100 and the worst station that an error or warning is about
 
+What is damaged or missing is nobody's as far as holes in the capture explain it, octets that were lost on their way
+into it: as many damaged frames, damaged answers and missing answers as there are holes count for nothing, of all
+senders in the same share.
+
 So half of the requests lost, or every fifth frame damaged, is a station at 0 or 40, and a bus with a dead station has
 50 at best. A station that was never asked and sent nothing has no health, nor has an address that was asked LOOKED_FOR
 times at most, never answered, and that no error or warning is about: somebody looked whether anybody is there.
@@ -51,6 +55,22 @@ class Health:
 
 
 @dataclass(frozen=True, slots=True)
+class _Beyond:
+    """Which share of what was counted is more than the holes of the capture explain, 0 … 1."""
+
+    frames: float = 1.0
+    answers: float = 1.0
+    unanswered: float = 1.0
+
+    @classmethod
+    def of(cls, summary: Summary, nodes: Iterable[Node]) -> _Beyond:
+        """The same for all senders: a hole has no favourite."""
+        holes = sum(count for kind, count in summary.events.items() if kind.is_hole)
+        counts = summary.damaged, summary.verdicts[Verdict.DAMAGED_ANSWER], sum(node.unanswered for node in nodes)
+        return cls(*(max(0, count - holes) / count if count else 1.0 for count in counts))
+
+
+@dataclass(frozen=True, slots=True)
 class HealthReport:
     """The health of a bus and of each station on it that has one, by address."""
 
@@ -66,13 +86,14 @@ def health_of(summary: Summary, findings: Iterable[Finding] = ()) -> HealthRepor
         address = station_of(finding)
         if address is not None:
             about.setdefault(address, []).append(finding)
+    there = [node for node in summary.nodes if _is_there(node, about)]
+    beyond = _Beyond.of(summary, there)
     stations = {
         node.address: health
         for node in summary.nodes.present()
-        if _is_there(node, about) and (health := station_health(node, about.get(node.address, ()))) is not None
+        if _is_there(node, about) and (health := station_health(node, about.get(node.address, ()), beyond)) is not None
     }
-    there = [node for node in summary.nodes if _is_there(node, about)]
-    bus = _bus_health(summary, there, [finding for finding in grave if finding.about.is_whole_bus])
+    bus = _bus_health(summary, there, beyond, [finding for finding in grave if finding.about.is_whole_bus])
     worst = min((address for address in about if address in stations), key=lambda a: stations[a].score, default=None)
     if worst is not None and (limit := (100 + stations[worst].score) // 2) < bus.score:
         first = about[worst][0].about
@@ -84,7 +105,8 @@ def health_of(summary: Summary, findings: Iterable[Finding] = ()) -> HealthRepor
 
 def bus_health(summary: Summary) -> Health:
     """Health of the bus alone, of which nobody has found anything."""
-    return _bus_health(summary, [node for node in summary.nodes if _is_there(node, {})], ())
+    there = [node for node in summary.nodes if _is_there(node, {})]
+    return _bus_health(summary, there, _Beyond.of(summary, there), ())
 
 
 def station_of(finding: Finding) -> int | None:
@@ -92,17 +114,18 @@ def station_of(finding: Finding) -> int | None:
     return finding.about.station
 
 
-def station_health(node: Node, findings: Iterable[Finding] = ()) -> Health | None:
+def station_health(node: Node, findings: Iterable[Finding] = (), beyond: _Beyond = _Beyond()) -> Health | None:
     """Health of one station, with the findings about it; None where it was never asked and sent nothing."""
     if not node.seen:
         return None
     asked, frames = node.asked, node.sent + node.received
     verdicts = node.verdicts
-    answers, of_frames = _share(verdicts[Verdict.DAMAGED_ANSWER], asked), _share(node.damaged, frames)
+    answers = beyond.answers * _share(verdicts[Verdict.DAMAGED_ANSWER], asked)
+    of_frames = beyond.frames * _share(node.damaged, frames)
     again = verdicts[Verdict.LATE] + verdicts[Verdict.ANSWERED_TWICE] + verdicts[Verdict.RETRY]
     return _sum(
         findings,
-        (_share(node.unanswered, asked), 200, 100, "of its requests without answer"),
+        (beyond.unanswered * _share(node.unanswered, asked), 200, 100, "of its requests without answer"),
         (max(answers, of_frames), 300, 60, f"of its {'answers' if answers > of_frames else 'frames'} damaged"),
         (_share(again, asked), 100, 30, "answered late, twice or after a repeat"),
         (_share(verdicts[Verdict.EXCEPTION], asked), 50, 20, "answered with an exception"),
@@ -114,13 +137,13 @@ def _is_there(node: Node, about: Mapping[int, object]) -> bool:
     return node.sent > 0 or node.address in about or node.asked > LOOKED_FOR
 
 
-def _bus_health(summary: Summary, nodes: Iterable[Node], findings: Iterable[Finding]) -> Health:
+def _bus_health(summary: Summary, nodes: Iterable[Node], beyond: _Beyond, findings: Iterable[Finding]) -> Health:
     nodes = list(nodes)
     asked, unanswered = sum(node.asked for node in nodes), sum(node.unanswered for node in nodes)
     return _sum(
         findings,
-        (_share(unanswered, asked), 100, 50, "of all requests without answer"),
-        (_share(summary.damaged, summary.frames), 300, 60, "of all frames damaged"),
+        (beyond.unanswered * _share(unanswered, asked), 100, 50, "of all requests without answer"),
+        (beyond.frames * _share(summary.damaged, summary.frames), 300, 60, "of all frames damaged"),
         (_share(summary.noise, summary.octets), 200, 30, "of all octets are no frame"),
         (_share(sum(summary.marks.values()), summary.octets), 200, 30, "of all octets with line errors"),
     )

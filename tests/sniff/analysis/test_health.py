@@ -10,6 +10,7 @@ from dissectors.tracker import Verdict
 from sniff.analysis.health import health_of, station_health, station_of
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
+from sniff.engine.session import LineEventKind
 
 
 def finding(code: str, subject: str, severity: Severity = Severity.ERROR) -> Finding:
@@ -98,3 +99,19 @@ def test_addresses_that_were_only_looked_for_cost_nothing() -> None:
 )
 def test_the_station_that_a_subject_names(subject: str, address: int | None) -> None:
     assert station_of(finding("X", subject)) == address
+
+
+def test_what_holes_explain_is_nobodys() -> None:
+    """Of packets of which only the begin was kept every answer is cut short, and no station is to blame."""
+    made = summary(node(1, 40, damaged_answer=8, no_response=2), node(2, 48, damaged_answer=2))
+    made.damaged = 10
+    made.verdicts[Verdict.DAMAGED_ANSWER] = 10
+    assert health_of(made).stations[1].score < 50
+    made.events[LineEventKind.DROPPED] = 5
+    half = health_of(made)
+    assert half.stations[1].reasons == ("8.0% of its answers damaged (−24)",)  # 16 % are, half of them at holes
+    made.events[LineEventKind.DROPPED] = 10
+    health = health_of(made)
+    assert (health.bus, {one.score for one in health.stations.values()}) == (health_of(summary(node(1, 50))).bus, {100})
+    made.events[LineEventKind.DROPPED], made.events[LineEventKind.NOTE] = 0, 50
+    assert health_of(made).stations[1].score < 50

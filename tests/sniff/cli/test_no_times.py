@@ -15,6 +15,7 @@ import pytest
 import sniff
 from tests.sniff.cli.conftest import Ran
 
+CLEAN = Path(__file__).parents[3] / "captures"
 LOG = "01 03 00 00 00 02 C4 0B\n01 03 04 00 01 00 02 2A 32\n" * 8
 Run = Callable[..., Ran]
 
@@ -75,3 +76,19 @@ def test_data_frames_have_nulls(log: Path) -> None:
         names = {"t", "time", "time_ns", "start_ns", "end_ns"} & {*frame.columns}
         assert names
         assert all(frame[name].null_count() == len(frame) > 0 for name in names)
+
+
+@pytest.mark.parametrize("protocol", ["profibus", "mstp"])
+def test_a_ring_has_no_rounds(protocol: str, tmp_path: Path, sniff485: Run) -> None:
+    frames = [
+        json.loads(line)["hex"]
+        for line in sniff485("show", "--json", CLEAN / f"{protocol}-clean.cap.txt").out.splitlines()
+    ]
+    log = tmp_path / "ring.log"
+    log.write_text("".join(f"{bytes.fromhex(octets).hex(' ')}\n" for octets in frames))
+    told = [json.loads(line) for line in sniff485("stats", "ring", "--json", log, "-p", protocol).out.splitlines()]
+    assert len(told) > 1
+    assert {value for one in told for name, value in one.items() if name.endswith(" ms")} == {None}
+    said = sniff485("stats", "ring", log, "-p", protocol).out
+    assert "not known" in said
+    assert not re.search(r" at \d|% of the time|\d s;", said)
