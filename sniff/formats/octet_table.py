@@ -318,8 +318,13 @@ def _column(cells: Sequence[Sequence[str]], many: int, wanted: Callable[[Sequenc
     return None
 
 
+_FRACTION = re.compile(r"[+-]?\d+[.,]\d+")
+
+
 def _are_octets(column: Sequence[str]) -> bool:
-    """Whether cells are runs of octets: more than one in most."""
+    """Whether cells are runs of octets: more than one in most. Two groups and a dot in each are a number."""
+    if all(_FRACTION.fullmatch(cell) for cell in column[:200]):
+        return False
     found = 0
     for cell in column[:200]:
         try:

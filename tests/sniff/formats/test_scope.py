@@ -147,3 +147,11 @@ def test_remarks_above_levels(tmp_path: Path) -> None:
     capture = read(path)
     list(capture.items())
     assert f"line {path.read_text().count(chr(10))}" in capture.completeness().text
+
+
+def test_volts_of_four_digits_are_no_octets(tmp_path: Path) -> None:
+    """20.14 is a number in every row, and no two octets."""
+    path = tmp_path / "volts.csv"
+    rows = (f"{_seconds(at):.7f},{volts + 14:.2f}\n" for at, volts in enumerate(VOLTS))
+    path.write_text("Time (s),Channel 1 (V)\n" + "".join(rows))
+    assert _octets(read(path)) == b"".join(FRAMES)
