@@ -16,13 +16,14 @@ them are an error, raised when all that was understood has been given.
 
 from __future__ import annotations
 
+import codecs
 import csv
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 from dissectors.frame import Chunk
 from dissectors.line import MS
@@ -31,7 +32,7 @@ from sniff.engine.session import NO_TIMES, Adapter, Completeness, Item, LineEven
 from sniff.formats.contents import utf16_of
 from sniff.formats.files import explain, open_capture
 from sniff.formats.log_assembly import Assembly
-from sniff.formats.log_lines import Kind, pieces
+from sniff.formats.log_lines import Kind, lines_in
 from sniff.formats.log_margin import plain_signs
 from sniff.formats.log_plan import LOOKED_AT, LOOKED_AT_CHARACTERS, Plan, plan_of
 from sniff.formats.log_shapes import DECODED, REMARK
@@ -42,7 +43,6 @@ from sniff.formats.timeless import LINE_END, SLOW
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
 
-LONGEST_LINE = 1 << 20
 MOST_ROWS = 5_000_000
 """Of a table, which is held in memory whole to be sorted: 140 octets of it a row."""
 
@@ -168,13 +168,7 @@ class ByteLog:
             try:
                 start = stream.read(1 << 12)
                 stream.seek(0)
-                if (codec := utf16_of(start)) is not None:
-                    yield from _utf16_lines(stream, codec)
-                    return
-                while line := stream.readline(LONGEST_LINE):
-                    text = line.decode("utf-8", "replace").rstrip("\r\n").removeprefix("\ufeff")
-                    for part in text.split("\r"):
-                        yield from pieces(part)
+                yield from lines_in(_decoded(stream, utf16_of(start) or "utf-8"))
             except OSError as error:
                 raise explain(self.path, error) from None
 
@@ -252,18 +246,11 @@ def _heading(lines: list[str]) -> tuple[int, TableLayout] | None:
     return None
 
 
-def _utf16_lines(stream: object, codec: str) -> Iterator[str]:
-    import codecs
-    from typing import BinaryIO, cast
-
+def _decoded(stream: BinaryIO, codec: str) -> Iterator[str]:
     decoder = codecs.getincrementaldecoder(codec)("replace")
-    rest = ""
-    while octets := cast(BinaryIO, stream).read(1 << 16):
-        *whole, rest = (rest + decoder.decode(octets)).split("\n")
-        yield from (line.rstrip("\r")[:LONGEST_LINE] for line in whole)
-        rest = rest[-LONGEST_LINE:]
-    if rest:
-        yield rest
+    while octets := stream.read(1 << 16):
+        yield decoder.decode(octets)
+    yield decoder.decode(b"", final=True)
 
 
 def _first(lines: Iterator[str]) -> Iterator[str]:

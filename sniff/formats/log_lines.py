@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
@@ -17,6 +17,9 @@ from sniff.formats.log_times import AS_WRITTEN, Times
 
 LONGEST = 1 << 13
 """Characters of a line that are looked at; a frame of a field bus is far shorter."""
+
+LONGEST_HELD = 1 << 17
+"""Characters of a line of which the end has not come; of a longer one the begin is given."""
 
 MOST_MORE = 512
 """Reads that one line tells."""
@@ -147,6 +150,26 @@ def _taken_apart(text: str, base: int, rows: bool, times: Times, least: int) -> 
 
 
 _remembered = lru_cache(REMEMBERED)(_taken_apart)
+
+
+def lines_in(parts: Iterable[str]) -> Iterator[str]:
+    """The lines of a text that comes in parts, wherever it is cut; long ones in pieces. Bounded."""
+    held = ""
+    for part in parts:
+        *whole, held = (held + part).split("\n")
+        for line in whole:
+            yield from _pieces_between(line.rstrip("\r"))
+        if len(held) > LONGEST_HELD:
+            *begun, held = _pieces_between(held)
+            yield from begun
+    if held:
+        yield from _pieces_between(held.rstrip("\r"))
+
+
+def _pieces_between(line: str) -> Iterator[str]:
+    """The pieces of lines that only a carriage return ends."""
+    for one in line.split("\r"):
+        yield from pieces(one.removeprefix("\ufeff"))
 
 
 def pieces(text: str) -> Iterator[str]:
