@@ -32,7 +32,7 @@ from sniff.engine.session import NO_TIMES, Adapter, Completeness, Item, LineEven
 from sniff.formats.contents import utf16_of
 from sniff.formats.files import explain, open_capture
 from sniff.formats.log_assembly import Assembly
-from sniff.formats.log_lines import Kind, lines_in
+from sniff.formats.log_lines import Kind, lines_in, rows_in
 from sniff.formats.log_margin import plain_signs
 from sniff.formats.log_plan import LOOKED_AT, LOOKED_AT_CHARACTERS, Plan, plan_of
 from sniff.formats.log_shapes import DECODED, REMARK
@@ -163,12 +163,12 @@ class ByteLog:
             return adapter
         return replace(adapter, latency=tick, latency_from=f"the log's clock, which counts {tick // MS} ms")
 
-    def _lines(self) -> Iterator[str]:
+    def _lines(self, split: Callable[[Iterator[str]], Iterator[str]] = lines_in) -> Iterator[str]:
         with open_capture(self.path) as stream:
             try:
                 start = stream.read(1 << 12)
                 stream.seek(0)
-                yield from lines_in(_decoded(stream, utf16_of(start) or "utf-8"))
+                yield from split(_decoded(stream, utf16_of(start) or "utf-8"))
             except OSError as error:
                 raise explain(self.path, error) from None
 
@@ -186,29 +186,40 @@ class ByteLog:
     def _table(self) -> Iterator[Item]:
         assert self._heading is not None
         at, table = self._heading
-        rows = csv.reader(map(plain_signs, islice(self._lines(), at, None)), delimiter=table.delimiter)
+        rows = csv.reader(map(plain_signs, islice(self._lines(rows_in), at, None)), delimiter=table.delimiter)
         next(rows, None)
         found: list[Chunk] = []
-        try:
-            for row in rows:
-                if not any(row):
-                    continue
-                if len(found) >= MOST_ROWS:
-                    raise CaptureError(f"{self.path}: a table of over {MOST_ROWS} rows; cut it into pieces")
-                if not table.holds(row) or all(_RULED.fullmatch(cell) for cell in row):
-                    self._counts.text += 1
-                    continue
-                try:
-                    found += table.chunks(row, self.session.line.char)
-                    self._counts.data += 1
-                except ValueError:
-                    self._counts.pass_over(at + rows.line_num)
-        except csv.Error:  # a field that never ends, a zero octet
-            self._counts.pass_over(at + rows.line_num)
+        for row in _each(rows):
+            if row is None:
+                self._counts.pass_over(at + rows.line_num)
+                continue
+            if not any(row):
+                continue
+            if len(found) >= MOST_ROWS:
+                raise CaptureError(f"{self.path}: a table of over {MOST_ROWS} rows; cut it into pieces")
+            if not table.holds(row) or all(_RULED.fullmatch(cell) for cell in row):
+                self._counts.text += 1
+                continue
+            try:
+                found += table.chunks(row, self.session.line.char)
+                self._counts.data += 1
+            except ValueError:
+                self._counts.pass_over(at + rows.line_num)
         first = min((chunk.time - len(chunk.octets) * self.session.line.char for chunk in found), default=0)
         if first < 0:  # counted from a trigger: no time is before 1970
             found = [replace(chunk, time=chunk.time - first) for chunk in found]
         yield from sorted(found, key=lambda chunk: chunk.time)  # two lines of a bus are listed one after the other
+
+
+def _each(rows: Iterator[list[str]]) -> Iterator[list[str] | None]:
+    """The rows of a table; None for one that is none: a field that never ends, a zero octet."""
+    while True:
+        try:
+            yield next(rows)
+        except csv.Error:
+            yield None
+        except StopIteration:
+            return
 
 
 class _Counts:

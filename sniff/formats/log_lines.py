@@ -21,6 +21,9 @@ LONGEST = 1 << 13
 LONGEST_HELD = 1 << 17
 """Characters of a line of which the end has not come; of a longer one the begin is given."""
 
+LONGEST_ROW = 1 << 20
+"""Characters of a row of a table; a longer one is none."""
+
 MOST_MORE = 512
 """Reads that one line tells."""
 _BETWEEN = 60
@@ -150,6 +153,20 @@ def _taken_apart(text: str, base: int, rows: bool, times: Times, least: int) -> 
 
 
 _remembered = lru_cache(REMEMBERED)(_taken_apart)
+
+
+def rows_in(parts: Iterable[str]) -> Iterator[str]:
+    """The lines of a text that comes in parts, whole: rows of a table, whose cells may be long. Bounded."""
+    held = ""
+    for part in parts:
+        *whole, held = (held + part).split("\n")
+        for line in whole:
+            yield from line.removeprefix("\ufeff").rstrip("\r").split("\r")
+        if len(held) > LONGEST_ROW:
+            yield held
+            held = ""
+    if held:
+        yield from held.rstrip("\r").split("\r")
 
 
 def lines_in(parts: Iterable[str]) -> Iterator[str]:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dissectors.frame import Chunk
 from sniff.formats import read
 from sniff.formats.log_lines import LONGEST_HELD, lines_in
 
@@ -24,6 +25,16 @@ def test_no_octet_is_lost(between: str, encoding: str, tmp_path: Path) -> None:
     capture = read(path)
     assert b"".join(block.reads.octets.tobytes() for block in capture.blocks()) == OCTETS  # type: ignore[union-attr]
     assert capture.completeness().whole
+
+
+def test_long_cells_of_a_table_are_read_whole(tmp_path: Path) -> None:
+    path, sizes = tmp_path / "long.csv", (20, 5000, 20, 60_000, 20)  # the fourth is longer than a cell may be
+    cells = [OCTETS[:size].hex(" ") if size < 60_000 else (OCTETS * 2)[:size].hex(" ") for size in sizes]
+    path.write_text("Time,Data\n" + "".join(f"2026-03-01 10:00:0{at}.000,{cell}\n" for at, cell in enumerate(cells)))
+    capture = read(path)
+    chunks = [len(item.octets) for item in capture.items() if isinstance(item, Chunk)]
+    assert chunks == [20, 5000, 20, 20]
+    assert "1 line was not understood" in capture.completeness().text
 
 
 @given(st.text("a0 \r\n", max_size=60), st.lists(st.integers(0, 60)))
