@@ -59,7 +59,7 @@ def judged(session: Session, items: Items) -> Judgement:
 
 def quiet_places(items: Items) -> list[int]:
     """Where no exchange is under way, behind the first few, and not directly behind what is said to all: that somebody
-    answers it is known by what was before."""
+    answers it is known by what was before. Nor behind a master's answer to a poll: it joins with the token after it."""
     first: dict[int, int] = {}
     last: dict[int, int] = {}
     to_all: set[int] = set()
@@ -68,6 +68,8 @@ def quiet_places(items: Items) -> list[int]:
             continue
         placed = [row.placement.tx for row in item.rows if row.placement is not None]
         if any(row.placement is not None and row.placement.role is Role.BROADCAST for row in item.rows):
+            to_all.add(at + 1)
+        if any(row.header is not None and row.header.kind == "reply-to-poll-for-master" for row in item.rows):
             to_all.add(at + 1)
         closed = [number for one in item.transactions for number in (one.id, one.of) if number is not None]
         for number in (*placed, *closed):

@@ -190,7 +190,7 @@ def test_one_of_several_captures_must_have_the_field(capsys: pytest.CaptureFixtu
     other = CAPTURE.replace("rtu-usual", "n2-usual")
     assert main(["show", other, CAPTURE, "-Y", "modbus.func_code == 8"]) == 0
     shown = capsys.readouterr()
-    assert len(shown.out.splitlines()) == 2
+    assert len([line for line in shown.out.splitlines() if line and line not in (other, CAPTURE)]) == 2
     assert "these frames are Metasys N2" in shown.err
     assert main(["show", other, CAPTURE, "-Y", "mstp.src == 8"]) == 2
 
