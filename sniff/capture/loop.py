@@ -28,6 +28,7 @@ from sniff.capture.ipc import (
     encode_tick,
 )
 from sniff.capture.ipc_sender import IpcSender
+from sniff.capture.run_watch import RunWatch
 from sniff.capture.trigger_ring import TriggerRing
 from sniff.capture.waiting import Waiting
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange, refusal
@@ -57,9 +58,6 @@ DRAIN = 0.2
 CLOSING_EVERY = 0.5
 LOOK_EVERY = 0.02
 """Seconds between words to the main process, and between looks at the files, while they are closed."""
-
-STALLED = 2 * NS_PER_S
-"""ns that this process was not let run, from which on what came meanwhile may be lost, and has no time of its own."""
 
 _COMMAND_SIZE = 64 * 1024
 _FAR = 1 << 62
@@ -107,8 +105,7 @@ class CaptureLoop:
     _hurried: bool = False
     _offset: int = 0
     _due: int = _FAR
-    _ran_at: int = 0
-    _ran_again: int = -_FAR
+    _runs: RunWatch = field(default_factory=lambda: RunWatch(0))
     _heard: bool = False  # since the last step
     _buses: list[_Bus] = field(default_factory=list)
 
@@ -134,7 +131,8 @@ class CaptureLoop:
         self._unknown = {index for index, session in enumerate(self.sessions) if session.unknown}
         self._beat_while_busy = BEAT if self.watched or self._unknown or self._counters else UNWATCHED_BEAT
         now = self.clock.now()
-        self._beat_at = self._status_at = self._ran_at = now
+        self._beat_at = self._status_at = now
+        self._runs = RunWatch(now)
         self._busy_until = now
         if self.commands is not None:
             self.commands.setblocking(False)
@@ -204,9 +202,9 @@ class CaptureLoop:
         wait = max(0, min(self._beat_at, self._due) - self.clock.now())
         ready = self._waiting.wait(wait / 1e9)
         now = self.clock.now()
-        if now - self._ran_at - wait >= STALLED:
-            self._say_stalled(now, now - self._ran_at)
-        self._ran_at = now
+        stalled = self._runs.see(now, wait)
+        if stalled is not None:
+            self._say_stalled(stalled)
         for _, call in ready:
             call()
         now = self.clock.now()
@@ -221,10 +219,8 @@ class CaptureLoop:
         if now >= self._beat_at or self.outlet.gathered > FLUSH_AT:
             self._beat(now)
 
-    def _say_stalled(self, now: int, time: int) -> None:
-        """Nobody read for so long: stopped, or a computer that did not get round to it. Its buffers hold some of what
-        came, as if it had come now."""
-        self._ran_again = now
+    def _say_stalled(self, time: int) -> None:
+        """Nobody read for so long, ns. Buffers hold some of what came, as if it had come now."""
         for bus in self._buses:
             if bus.fd is not None:
                 text = f"nobody knows how many: this process did not run for {time / NS_PER_S:.0f} s"
@@ -317,7 +313,8 @@ class CaptureLoop:
         for index, (recorder, watch) in enumerate(zip(self.recorders, self._watches, strict=True)):
             told = [recorder.notices.popleft() for _ in range(len(recorder.notices))]
             # trouble is said, and explains that nothing is written; so does that nobody ran
-            explained = recorder.trouble is not None or now - self._ran_again < SLOW
+            runs = self._runs.runs_since(now)
+            explained = recorder.trouble is not None or (runs is not None and runs < SLOW)
             behind, syncing = (0, 0) if explained else (recorder.behind(now), recorder.syncing)
             slow = watch.see(now, behind, syncing, recorder.lost_octets)
             for text in told + ([slow] if slow is not None else []):

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from dissectors.frame import Chunk
-from sniff.capture import loop as capture_loop
+from sniff.capture.run_watch import STALLED, RunWatch
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.formats import read
 from tests.e2e.recording_bus import LINE, Command, Feeder, capture_processes, octets_of, wait_until
@@ -30,7 +30,7 @@ def test_who_was_stopped_says_that_nobody_read(tmp_path: Path) -> None:
         bus.until_read()
         os.kill(pid, signal.SIGSTOP)
         bus.feed(poll)
-        time.sleep(capture_loop.STALLED / S + 1)
+        time.sleep(STALLED / S + 1)
         os.kill(pid, signal.SIGCONT)
         bus.until_read()
         command.send(signal.SIGINT)
@@ -49,3 +49,13 @@ def test_who_was_stopped_says_that_nobody_read(tmp_path: Path) -> None:
     assert [item.octets for item in after if isinstance(item, Chunk)] == [poll]
     assert not [item for item in items if isinstance(item, LineEvent) and "disk" in item.text]
     assert not [line for line in command.said if "disk" in line]
+
+
+def test_a_long_wait_is_no_stall() -> None:
+    runs = RunWatch(0)
+    assert runs.see(10 * S, 10 * S) is None
+    assert runs.runs_since(10 * S) is None
+    assert runs.see(12 * S, S // 2) is None
+    assert runs.see(15 * S, S // 2) == 3 * S
+    assert runs.runs_since(16 * S) == S
+    assert runs.see(16 * S, S) is None
