@@ -40,6 +40,7 @@ class ProfibusFindings:
     def __init__(self, timing: Timing) -> None:
         self.watch = self.watches(timing, self._noticed)
         self._usual, self._tolerance = timing.line.bits(usual_tsdr(timing.line.baud)), timing.line.bits(_TOLERANCE)
+        self._has_times = timing.has_times
         self._most: Callable[[int], int | None] | None = None
         self._limits: dict[int, int] = {}
         self.records: dict[int, RequestsRecord] = defaultdict(RequestsRecord)
@@ -156,13 +157,20 @@ class ProfibusFindings:
             yield record.twice.found(RULES["PB010"], who, seen, grave)
         if record.refused.count:
             seen = f"{record.refused.count} of {total} requests refused: {'; '.join(sorted(record.refusals)[:4])}"
-            yield record.refused.found(RULES["PB017"], who, seen, _grave(record.put_off, record.exchanged))
+            starved = self._excused(who.station or 0)
+            grave = _grave(max(0, record.put_off - starved), record.exchanged)
+            yield record.refused.found(RULES["PB017"], who, seen, grave)
         if record.slow.count >= _LEAST and record.slow.count >= _SLOW_SHARE * total:
             slowest = milliseconds(record.slowest)
             limit = self._limits.get(who.station or 0, self._usual)
             allowed = "usual" if limit == self._usual else f"its GSD allows ({milliseconds(limit)})"
             seen = f"{record.slow.count} of {total} answers later than {allowed}; the slowest after {slowest}"
             yield record.slow.found(RULES["PB018"], who, seen)
+
+    def _excused(self, address: int) -> int:
+        """How often a slave left data exchange, and that need not be its own fault: it must refuse data then."""
+        whose = (Notice.STARVED,) if self._has_times else (Notice.STARVED, Notice.DROP)
+        return sum(self._noted[what, address].count for what in whose if (what, address) in self._noted)
 
     def _of_repeats(self) -> Iterator[Finding]:
         """Repeats of what was answered well here: of one station's requests, or of the bus where most stations' are."""
@@ -190,6 +198,9 @@ class ProfibusFindings:
         if fallen is not None:
             grave = Severity.ERROR if fallen.count >= _LEAST else Severity.WARNING
             seen = f"left data exchange {times(fallen.count)}{_watchdog(slave)}"
+            if not self._has_times:
+                grave = Severity.NOTE
+                seen += "; whether its master was silent before, a log without times does not tell"
             yield fallen.found(RULES["PB007"], who, seen, grave)
         starved = self._noted.get((Notice.STARVED, address))
         if starved is not None and fallen is None:

@@ -77,10 +77,11 @@ RULES: dict[str, Rule] = {
             "dropped out of data exchange",
             "A slave that exchanged data wants new parameters, or refuses data, although nobody unlocked it. An error "
             "from three times on. Only noted where its master had asked nothing for longer than the watchdog (than "
-            "ever before, where that was not heard), or octets were damaged since its last answer.",
+            "ever before, where that was not heard), octets were damaged since its last answer, or the log has no "
+            "times.",
             "its watchdog expired because requests did not reach it, its supply failed, or it restarted",
             "whether its master was silent before; the watchdog time in Set_Prm; the supply of the slave",
-            explains=("PB009", "PB017"),
+            explains=("PB002", "PB003", "PB009", "PB017"),
         ),
         Rule(
             "PB008",
@@ -176,7 +177,8 @@ RULES: dict[str, Rule] = {
             Severity.NOTE,
             "requests refused",
             "A station answers with an error: service not activated (RS), no resources (RR), user error (UE). A "
-            "warning from 3 and 1 in 100 requests for data exchange on; other services a device need not have.",
+            "warning from 3 and 1 in 100 requests for data exchange on, without those that show that it left data exchange "
+            "and need not be at fault (PB007); other services a device need not have.",
             "a service that the device does not have, or one that it cannot do in its present state",
             "which service is refused, and in which state the slave is",
         ),

@@ -66,6 +66,7 @@ class SlaveView:
     rejects: int = 0
     diagnoses: int = 0
     faults: int = 0
+    was_exchanging: bool = False  # when it fell silent
     is_blurred: bool = False  # octets were damaged since it last answered: what its master told it may be lost here
 
     def ask(self, time: int, master: int) -> None:
@@ -129,6 +130,7 @@ class SlaveView:
         """Take a state."""
         if state is self.state:
             return
+        self.was_exchanging = state is SlaveState.OFFLINE and self.state is SlaveState.EXCHANGE
         self.state = state
         self.changed += 1
         self.changes.append((time, state))
@@ -187,7 +189,7 @@ class SlaveView:
         if not said.wants_parameters:
             return False
         self.owner = None
-        fell = self.state is SlaveState.EXCHANGE and not self.unlocked
+        fell = (self.state is SlaveState.EXCHANGE or self.was_exchanging) and not self.unlocked
         self.drops += fell
         self.become(SlaveState.WAIT_PARAMETERS, time)
         return fell
