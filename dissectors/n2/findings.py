@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dissectors.findings import Finding, Tally
 from dissectors.frame import Damage, Event, Frame, Header, Noise
 from dissectors.late_speakers import Due, LateSpeakers, reaching
-from dissectors.line import Timing
+from dissectors.line import NS_PER_S, Timing
 from dissectors.n2.clocked import Clocked
 from dissectors.n2.commands import parse_command
 from dissectors.n2.envelope import check_off
@@ -31,6 +31,9 @@ from dissectors.strikes import Strikes
 from dissectors.tracker import Placement, Transaction, Verdict
 
 __all__ = ["SLOW", "N2Findings"]
+
+RESET_WITHIN = 60 * NS_PER_S
+"""A station that answers N00 so soon after a warm reset has made the one that it was told to."""
 
 ANSWERS_KEPT = 8
 """Answers remembered, to tell a repeat from a second one."""
@@ -255,7 +258,10 @@ class N2Findings:
         command, time = asked.command, transaction.end
         if code == "00":
             if not station.waits:
-                station.resets.add(time, transaction.response)
+                told = station.told_to_reset
+                is_told = told is not None and time - told < RESET_WITHIN
+                (station.resets_told if is_told else station.resets).add(time, transaction.response)
+                station.told_to_reset = None
                 station.waits = True
             station.refused_while_reset += 1
             station.overrides.clear()
@@ -276,7 +282,7 @@ class N2Findings:
             station.identified, station.waits = True, False
         elif kind == "warm-reset":
             station.overrides.clear()
-            station.identified = False
+            station.identified, station.told_to_reset = False, transaction.end
         elif command.region is None or command.object is None or self._is_ignored(transaction, kind, command.region):
             return
         elif kind == "override":

@@ -115,11 +115,13 @@ class N2StationRecord:
     waits: bool = False  # it answered N00 and was not identified since
     slowest: int = 0
     refused_while_reset: int = 0
+    told_to_reset: int | None = None  # when it obeyed a warm reset last, ns
     sent: Damages = field(default_factory=Damages)
     missing: Missing = field(default_factory=Missing)
     behind: Tally = field(default_factory=Tally)  # damaged commands directly behind one to it that nothing followed
     unheard: Missing = field(default_factory=Missing)  # the same, where the master had an answer
     resets: Tally = field(default_factory=Tally)
+    resets_told: Tally = field(default_factory=Tally)  # those that its master told it to make
     slow: Tally = field(default_factory=Tally)
     again: Tally = field(default_factory=Tally)
     twice: Tally = field(default_factory=Tally)

@@ -12,7 +12,8 @@ RULES: dict[str, Rule] = {
             Severity.WARNING,
             "station has reset",
             "A station answers N00 to everything after power-up or reset, until it is identified (TECO F510 manual "
-            "1.2.4). Answers N00 without an identify between them count as one reset.",
+            "1.2.4). Answers N00 without an identify between them count as one reset. Only noted where the master "
+            "had sent a warm reset (0/8) within a minute before.",
             "power loss, watchdog or a warm reset; its overrides may be lost",
             "look at its supply and its fault memory at that time",
         ),

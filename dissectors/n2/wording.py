@@ -242,6 +242,9 @@ def _of_station(heard: N2Evidence, name: str, station: N2StationRecord, is_told:
     if station.resets.count:
         seen = f"answered N00 {times(station.refused_while_reset)}: {times(station.resets.count)} reset"
         yield station.resets.found(RULES["N2001"], name, seen)
+    elif station.resets_told.count:
+        seen = f"{times(station.resets_told.count)} reset, as its master had told it to"
+        yield station.resets_told.found(RULES["N2001"], name, seen, Severity.NOTE)
     yield from _points(name, station)
     if station.slow.count:
         yield _slow(heard, name, station)
