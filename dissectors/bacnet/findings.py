@@ -38,6 +38,7 @@ often than after other tokens."""
 
 POSTPONED_SHARE = 0.1
 LEAST_USES = 20
+FOR_OTHERS_LEAST = 3
 SKIPPED_ROUNDS = 20
 """So many tokens past a station that is in the ring, and not one poll to it, are no accident."""
 
@@ -70,6 +71,7 @@ def judge(ring: Ring) -> tuple[Finding, ...]:
         *_times(ring),
         *polls(ring),
         *_answers(ring),
+        *_for_others(ring),
         *hearing(ring),
         *damage(ring),
         *duplicates(ring),
@@ -125,6 +127,15 @@ def _holders(ring: Ring) -> Iterable[Remark]:
             why = "an address above 127 can have no token" if mac > MAX_MASTER else "it never gets a token"
             seen = f"sent {times(unasked.count)} without being asked, while MAC {listed(held)} had the token; {why}"
             yield of("MS111", mac, seen, unasked, Severity.NOTE if unasked.count == 1 else None)
+
+
+def _for_others(ring: Ring) -> Iterable[Remark]:
+    """Those who answer what others are asked."""
+    for (what, mac), happened in ring.happened.items():
+        if what is RingEventKind.FOR_ANOTHER:
+            asked = listed(sorted({event.other for event in happened.events if event.other is not None}))
+            seen = f"answered {times(happened.count)} what MAC {asked} was asked"
+            yield of("MS306", mac, seen, happened, Severity.NOTE if happened.count < FOR_OTHERS_LEAST else None)
 
 
 def _skipped_by(ring: Ring, mac: int, node: RingNode) -> tuple[int, int, int] | None:
@@ -255,7 +266,7 @@ def _answers(ring: Ring) -> Iterable[Remark]:
     for mac, node in ring.nodes.items():
         if node.postponed >= 5 and node.postponed > POSTPONED_SHARE * node.requests_received:
             seen = f"{node.postponed} of {counted(node.requests_received, 'request')} answered with Reply Postponed"
-            if node.service.count:
+            if node.service.count and ring.timing.has_times:
                 median, most = measured(node.service.quantile(0.5)), measured(node.service.most)
                 seen += f"; the real answers took {median}, up to {most}"
             yield plain("MS303", ring, mac, seen, node.postponed)

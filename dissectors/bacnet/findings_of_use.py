@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dissectors.bacnet.limits import N_POLL, T_USAGE_TIMEOUT_MAX
 from dissectors.bacnet.ring import Ring, RingEventKind, RingNode
 from dissectors.bacnet.ring_questions import T_GO_ON
-from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
+from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain, share_of_polls
 from dissectors.bacnet.rules import RULES
 from dissectors.findings import Severity, as_consequence, counted, times
 from dissectors.line import NS_PER_S
@@ -44,8 +44,7 @@ def polls(ring: Ring) -> Iterable[Remark]:
             seen.append(
                 f"{made} polls to {tokens} tokens (one in {N_POLL} is usual), {min(made, node.polls_unanswered)} "
                 "of them "
-                f"unanswered, up to address {node.highest_polled}; "
-                f"unanswered polls of all stations take {ring.poll_waste_share:.0%} of the time"
+                f"unanswered, up to address {node.highest_polled}{share_of_polls(ring)}"
             )
         stopped = ring.of(RingEventKind.STOPPED, mac)
         if stopped.count > 1:
@@ -84,8 +83,8 @@ def _of_all_who_poll(ring: Ring, who: frozenset[int]) -> Remark:
     nodes = [ring.nodes[mac] for mac in who]
     made, tokens = sum(map(_polls_made, nodes)), sum(node.tokens_received for node in nodes)
     seen = (
-        f"MAC {listed(sorted(who))} poll alike: {made} polls to {tokens} tokens (one in {N_POLL} is usual); unanswered "
-        f"polls of all stations take {ring.poll_waste_share:.0%} of the time"
+        f"MAC {listed(sorted(who))} poll alike: {made} polls to {tokens} tokens (one in {N_POLL} is usual)"
+        f"{share_of_polls(ring)}"
     )
     return plain("MS201", ring, None, seen, made)
 
@@ -130,8 +129,10 @@ def has_two_rhythms(ring: Ring, mac: int) -> bool:
 
 
 def use(ring: Ring) -> Iterable[Remark]:
-    """Who uses the line: slow rounds, a station that takes most of the time, broadcasts in masses, nearly no "
-    "time left."""
+    """Who uses the line: slow rounds, a station that takes most of the time, broadcasts in masses, nearly no
+    time left. A log without times says nothing of that."""
+    if not ring.timing.has_times:
+        return
     yield from _slow_rounds(ring)
     if ring.span < LEAST_WATCHED:
         return

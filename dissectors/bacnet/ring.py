@@ -37,6 +37,7 @@ class RingEventKind(Enum):
     OTHER_ECHO = "a test of the own address answered with other octets"
     DAMAGED_REPLY = "damaged octets in place of an answer"
     TOO_SOON = "sent again before its own poll could be answered"
+    FOR_ANOTHER = "answered what another station was asked"
     UNASKED = "sent without being asked, and never has the token"
     LATE_USE = "late to use the token"
     GIVEN_UP = "used the token after it was given up"
@@ -371,10 +372,7 @@ class Ring:
             MappingProxyType(edges),
             MappingProxyType(happened),
             MappingProxyType(
-                {
-                    pair: max(self.polled.get(pair, 0), other.polled.get(pair, 0))
-                    for pair in self.polled.keys() | other.polled.keys()
-                }
+                {pair: max(one.polled.get(pair, 0) for one in (self, other)) for pair in {*self.polled, *other.polled}}
             ),
         )
 

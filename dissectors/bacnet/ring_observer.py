@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from dissectors.bacnet.foreign_answers import answered_for
 from dissectors.bacnet.frame_types import CARRIES_NPDU, EXPECTING, PROPRIETARY, FrameType
 from dissectors.bacnet.header import is_whole_header
 from dissectors.bacnet.limits import BROADCAST, MAX_MASTER, N_MIN_OCTETS, T_NO_TOKEN
@@ -173,6 +174,10 @@ class MstpRingObserver(TokenWatch):
             if took is not None:
                 tally.note(RingEventKind.USED_BOTH, frame.start, no, slow, None, took)
         self._questions.holder, asked = self._holder, self._questions.asked
+        if self._answers_for_another(no, frame, frame_type, source, destination):
+            node.data_sent += 1
+            self._disturbed = True
+            return
         answers = self._questions.is_answer(no, frame, frame_type, source, destination, node)
         check_addresses(tally, no, frame, frame_type, source, destination)
         if source != self._holder:
@@ -203,6 +208,23 @@ class MstpRingObserver(TokenWatch):
                 self._questions.asked = AskedInRing(frame_type, source, destination, frame, no)
             elif frame_type in CARRIES_NPDU or frame_type >= PROPRIETARY:
                 self._see_data(no, frame, frame_type, source, destination, node, answers, header)
+
+    def _answers_for_another(self, no: int, frame: Frame, frame_type: int, source: int, destination: int) -> bool:
+        """Whether it answers what the holder of the token asked of another station. Notes it."""
+        if source == self._holder or destination != self._holder or self._doubt:
+            return False
+        if frame_type not in CARRIES_NPDU or frame_type in EXPECTING:
+            return False
+        asked = self._questions.asked
+        if self._before is None or (source, destination) in self._questions.postponed:
+            return False
+        if asked is not None and asked.destination == source:
+            return False
+        other = answered_for(frame, self._before, None if asked is None else asked.frame)
+        if other is None:
+            return False
+        self._tally.note(RingEventKind.FOR_ANOTHER, frame.start, no, source, other)
+        return True
 
     def _poll(self, no: int, frame: Frame, source: int, destination: int, node: NodeTally) -> None:
         node.polls_sent += 1

@@ -67,6 +67,13 @@ def _pair(happened: Happened, mac: int | None) -> str:
     return subject(mac)
 
 
+def share_of_polls(ring: Ring) -> str:
+    """How much of the time polls take that nobody answers; "" where nothing tells times."""
+    if not ring.timing.has_times:
+        return ""
+    return f"; unanswered polls of all stations take {ring.poll_waste_share:.0%} of the time"
+
+
 def measured(time: int | None) -> str:
     """A duration (ns) for people, "?" where it is not known."""
     return "?" if time is None else duration(time)

@@ -210,6 +210,18 @@ _ALL = (
         "object, property and service asked for, against what the device has; take what it has not out of the client",
     ),
     Rule(
+        "MS306",
+        Severity.WARNING,
+        "answers what others are asked",
+        "An answer with the invoke id and the service of a request to another station on this bus, sent while that one "
+        "was to answer or directly behind its answer. The client gives each request an id of its own. Fewer than three "
+        "times it is only noted; what comes from behind routers does not count.",
+        "a program that takes every request for its own, whoever it is addressed to; its answers run into those of the "
+        "station that was asked",
+        "firmware of the station named: it must look at the destination of what it hears",
+        explains=("MS104", "MS301", "MS401", "MS402", "MS403", "MS406", "LN101", "LN103", "LN2"),
+    ),
+    Rule(
         "MS401",
         Severity.WARNING,
         "damaged frames",

@@ -135,7 +135,7 @@ class TokenWatch:
             return
         if self._is_known_second(no, frame, source):
             return
-        if self._holder is not None and not self._doubt:
+        if self._holder is not None and not self._doubt and not self._may_begin_anew(frame):
             if self._was_unheard(no, frame, source, node):
                 return
             if self._is_slave(frame, source, node):
@@ -148,10 +148,16 @@ class TokenWatch:
         self._forget()
         self._holder = source
 
+    def _may_begin_anew(self, frame: Frame) -> bool:
+        """Whether who sends may have made a token that was lost: a log without times does not show the silence."""
+        return not self._tally.timing.has_times and makes_token(frame)
+
     def _came_back(self, no: int, frame: Frame, source: int) -> bool:
         """Whether the token was used unheard, and is back: its sender goes on sooner than it may repeat it."""
         token, holder = self._token, self._holder
         if token is None or holder is None or self._doubt or frame.octets == token.octets:
+            return False
+        if not self._tally.timing.has_times:
             return False
         if frame.start - token.end + token.slack >= T_USAGE_TIMEOUT:
             return False
@@ -258,6 +264,7 @@ class TokenWatch:
         end_search(tally, no, frame, source, node)
         again = (
             before is not None
+            and source != destination  # who passes the token to itself uses it by doing so again
             and not self._doubt
             and before.octets[:HEADER] == frame.octets[:HEADER]
             and self._gap(frame) + before.slack >= T_USAGE_TIMEOUT // 2

@@ -148,8 +148,10 @@ class UnheardFrames:
     def answered(self, no: int, asked: Frame, frame: Frame) -> bool:
         """Whether who asked goes on so soon that it had the answer, which was not heard. Notes it.
 
-        It waits for at least 255 ms; of one that does not, the wait is not known.
+        It waits for at least 255 ms; of one that does not, the wait is not known. Nor is it in a log without times.
         """
+        if not self._tally.timing.has_times:
+            return False
         server, client = asked.octets[3], asked.octets[4]
         node = self._tally.nodes.get(server)
         limit = T_REPLY_DELAY if node is not None and node.replies else T_IMPATIENT

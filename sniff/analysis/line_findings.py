@@ -77,7 +77,7 @@ class LineFindings:
         """`dissector`: that of the session, where it is in no registry."""
         self._session = session
         self._patterns = TimePatterns(session)
-        self._use = LineUse(session.line)
+        self._use = LineUse(session.line, has_times=session.timing.has_times)
         adapter = session.adapter
         self._senders = Senders(session.timing, adapter.packets)
         self._is_of_text = LineSettings.parse((dissector or dissector_for(session)).default_line).data_bits == 7
@@ -300,8 +300,7 @@ class LineFindings:
             made += self._wrong_octets()
         made += self._of_bus()
         made += self._patterns.findings()
-        if self._session.has_times:
-            made += self._use.findings()
+        made += self._use.findings()
         return tuple(made)
 
     def _can_tell(self) -> Finding:

@@ -33,9 +33,13 @@ ONLY_BROADCASTS = 0.95
 
 
 class LineUse:
-    """Fed every row of one bus; `findings` may be asked at any time."""
+    """Fed every row of one bus; `findings` may be asked at any time.
 
-    def __init__(self, line: LineSettings) -> None:
+    `has_times`: false of a log without times, which says nothing of load.
+    """
+
+    def __init__(self, line: LineSettings, *, has_times: bool = True) -> None:
+        self._has_times = has_times
         self._char = line.char
         self._busy = 0  # ns of octets in all
         self._second: int | None = None
@@ -113,6 +117,8 @@ class LineUse:
 
     def findings(self) -> Iterator[Finding]:
         """What there is to say so far."""
+        if not self._has_times:
+            return
         noted, full = self._most[SHORT], self._most[LONG]
         if noted >= BUSY or full >= FULL:
             span = LONG if full >= FULL else SHORT

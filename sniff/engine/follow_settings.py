@@ -110,7 +110,8 @@ class SessionEngine:
         if (line, protocol) == (self.engine.timing.line, self.engine.dissector.name):
             return NOTHING
         self._in_force = line
-        return self._restart(Timing(line, self.session.adapter.latency), protocol)
+        timing = Timing(line, self.session.adapter.latency, has_times=self.session.timing.has_times)
+        return self._restart(timing, protocol)
 
     def _find(self, change: SettingsChange) -> Output:
         """The search ends: what was heard with the last attempt is read."""

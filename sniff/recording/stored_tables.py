@@ -48,7 +48,7 @@ def record_of(session: Session, counted: StoredRecord) -> dict[str, str]:
         "version": str(VERSION),
         "program": program(),
         "protocol": session.protocol,
-        "timing": f"{timing.line} {timing.latency} {timing.is_told}",
+        "timing": f"{timing.line} {timing.latency} {timing.is_told} {timing.has_rate} {timing.has_times}",
         **counts,
     }
 

@@ -239,6 +239,23 @@ def last_two_octets_missing() -> list[Step]:
     return steps + rounds(4, 12, 20)
 
 
+def answers_for_others() -> list[Step]:
+    """19 answers what 12 is asked, too: now behind it, now in its place."""
+    steps: list[Step] = []
+    for at in range(6):
+        ask, value = (f"{octets[:at_id]}{at + 1:02x}{octets[at_id + 2 :]}" for octets, at_id in ((READ, 8), (VALUE, 6)))
+        steps += [*rounds(4, 3, 12, 19), (2, data(3, 12, ask, expects=True))]
+        if at % 2:
+            steps.append((6, data(12, 3, value)))
+        steps += [(3, data(19, 3, value)), (5 if at % 2 else 262, token(3, 12)), (2, token(12, 19)), (2, token(19, 3))]
+    return steps + rounds(4, 3, 12, 19)
+
+
+def token_to_itself() -> list[Step]:
+    """3 believes to be alone, and passes the token to itself; the adapter hides how soon."""
+    return [(4 + at % 3 * 9, token(3, 3)) for at in range(60)]
+
+
 MADE = {
     "ms-tp-token-used-after-it-was-given-up": used_late,
     "ms-tp-token-and-its-repeat-both-used": used_twice,
@@ -264,10 +281,12 @@ MADE = {
     "ms-tp-segments-that-ask": segments_that_ask,
     "ms-tp-questions-not-understood-here": questions_not_understood,
     "ms-tp-last-two-octets-missing": last_two_octets_missing,
+    "ms-tp-answers-what-others-are-asked": answers_for_others,
+    "ms-tp-token-to-itself-behind-an-adapter": token_to_itself,
 }
 
 
-LATENCY = {"ms-tp-lost-token-behind-an-adapter": 17.5}
+LATENCY = {"ms-tp-lost-token-behind-an-adapter": 17.5, "ms-tp-token-to-itself-behind-an-adapter": 17.5}
 """ms, of captures that come through an adapter that holds reads back."""
 
 

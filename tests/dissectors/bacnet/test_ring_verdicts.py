@@ -365,3 +365,40 @@ def test_one_that_had_the_token_has_not_surely_made_a_new_one(silence: float):
     for maker in (1, 8):
         read = script(lost(silence, maker, 20), latency=17.5)
         assert not [what for what, _ in read.ring.happened if what is RingEventKind.LOST_TOKEN]
+
+
+def _question(number: int) -> tuple[str, str]:
+    """A ReadProperty and its answer, with that invoke id."""
+    return READ[:8] + f"{number:02x}" + READ[10:], VALUE[:6] + f"{number:02x}" + VALUE[8:]
+
+
+@pytest.mark.parametrize("latency", [0, 17.5])
+def test_who_answers_what_others_are_asked_has_no_second_token(latency: float):
+    """19 answers the requests to 12, behind its answers or in their place: the invoke id says so."""
+    steps: list[Step] = []
+    for at in range(6):
+        ask, value = _question(at + 1)
+        steps += [*rounds(4, 3, 12, 19), (2, data(3, 12, ask, expects=True))]
+        if at % 2:
+            steps.append((6, data(12, 3, value)))
+        steps += [(3, data(19, 3, value)), (5 if at % 2 else 270, token(3, 12)), (2, token(12, 19)), (2, token(19, 3))]
+    read = script(steps, latency)
+    assert read.graves() == {("MS306", "MAC 19"), ("MS301", "3 → 12")}
+    assert read.of("MS306").seen == "answered 6 times what MAC 12 was asked"
+    assert not any(what in (RingEventKind.UNHEARD, RingEventKind.TWO_TOKENS) for what, _ in read.ring.happened)
+
+
+def test_an_answer_with_another_id_is_for_a_question_that_was_not_heard():
+    steps: list[Step] = []
+    for at in range(6):
+        ask, value = _question(at + 1)
+        steps += [*rounds(4, 3, 12, 19), (2, data(3, 12, ask, expects=True)), (6, data(12, 3, value))]
+        steps += [(20, data(19, 3, _question(at + 90)[1])), (3, token(3, 12)), (2, token(12, 19)), (2, token(19, 3))]
+    assert not any(one.code == "MS306" for one in script(steps).findings)
+
+
+def test_a_token_to_itself_is_never_repeated():
+    """Whoever passes the token to itself uses it by doing so again, however slowly."""
+    read = script([(4 + at % 3 * 12, token(3, 3)) for at in range(60)], 17.5)
+    assert not read.graves()
+    assert {one.code for one in read.findings} == {"MS107"}
