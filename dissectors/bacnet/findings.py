@@ -12,7 +12,7 @@ from dissectors.bacnet.findings_of_refusals import REFUSED_KEPT, Refusals
 from dissectors.bacnet.findings_of_tokens import silences, tokens
 from dissectors.bacnet.findings_of_use import polls, use
 from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
-from dissectors.bacnet.ring import COARSE_LIMIT, Ring, RingEventKind, RingNode, lies_between
+from dissectors.bacnet.ring import COARSE_LIMIT, Happened, Ring, RingEventKind, RingNode, lies_between
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.bacnet.ring_window import MstpRingWindow
 from dissectors.bacnet.rules import RULES
@@ -25,6 +25,9 @@ from dissectors.tracker import PASSING, Placement, Transaction, Verdict
 
 LATE_SHARE = 0.01
 """Share of slow uses of the token from which on a station is named."""
+
+ASKING_SHARE = 0.1
+"""The same of those that ask: whether a computer read them late, what comes behind them does not show."""
 
 ALL_LATE = 4
 """A station is named for slow uses of the token where its share is so many times that of the others: what hits all of
@@ -213,8 +216,14 @@ def _times(ring: Ring) -> Iterable[Remark]:
     yield from _late_uses(ring)
 
 
+def _late_at(ring: Ring, mac: int, node: RingNode) -> Happened:
+    """When a station used the token late; to ask, only where so often that no computer reads as late."""
+    late, asking = ring.of(RingEventKind.LATE_USE, mac), ring.of(RingEventKind.LATE_ASKING, mac)
+    return late.merge(asking) if asking.count >= ASKING_SHARE * node.use.count else late
+
+
 def _late_uses(ring: Ring) -> Iterable[Remark]:
-    uses = {mac: (ring.of(RingEventKind.LATE_USE, mac), node) for mac, node in ring.nodes.items() if node.use.count}
+    uses = {mac: (_late_at(ring, mac, node), node) for mac, node in ring.nodes.items() if node.use.count}
     least_share = _least_share(ring)
     for mac, (late, node) in uses.items():
         given_up = ring.of(RingEventKind.GIVEN_UP, mac)

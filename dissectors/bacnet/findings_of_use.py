@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from dissectors.bacnet.limits import N_POLL, T_USAGE_TIMEOUT_MAX
+from dissectors.bacnet.limits import N_POLL, T_USAGE_DELAY, T_USAGE_TIMEOUT_MAX
 from dissectors.bacnet.ring import Ring, RingEventKind, RingNode
 from dissectors.bacnet.ring_questions import T_GO_ON
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain, share_of_polls
@@ -194,7 +194,9 @@ def _storm(ring: Ring) -> Iterable[Remark]:
 
 
 def _near_limit(ring: Ring) -> Iterable[Remark]:
-    idle = ring.predicted_loop
+    idle, at_most = ring.predicted_loop, ""
+    if idle and not ring.measurable(T_USAGE_DELAY):
+        idle, at_most = idle + len(ring.order) * T_USAGE_DELAY, "at most "  # how long they take is not known
     loops = [ring.nodes[mac].loop.quantile(0.5) for mac in ring.order if mac in ring.nodes]
     known = [loop for loop in loops if loop is not None]
     if not idle or not known or ring.span < LEAST_WATCHED:
@@ -205,6 +207,6 @@ def _near_limit(ring: Ring) -> Iterable[Remark]:
     if for_data >= NEAR_LIMIT and loop >= STRETCHED * idle:
         seen = (
             f"data take {for_data:.0%} of the time; a round takes {measured(loop)} where an idle one would take "
-            f"{measured(idle)}"
+            f"{at_most}{measured(idle)}"
         )
         yield plain("MS603", ring, None, seen, severity=Severity.NOTE)

@@ -2,7 +2,10 @@
 
 A busy computer returns reads late, by more than any adapter's latency. Such a read shows itself by what follows: frames
 that it holds stand back to back, closer than any driver can, or the next one comes sooner than a station may wait. Then
-the first frame of it was on the line earlier than its time says, and nothing is judged.
+the first frame of it was on the line earlier than its time says, and nothing is judged. A frame that asks shows nothing
+of that kind: the answer to it may take long.
+
+An adapter that nobody named is not known to be exact: what is over a limit by less than a tick of its is not late.
 """
 
 from __future__ import annotations
@@ -11,21 +14,25 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from dissectors.bacnet.frame_types import FrameType
-from dissectors.bacnet.limits import T_USAGE_DELAY
+from dissectors.bacnet.limits import MS, T_USAGE_DELAY
 from dissectors.bacnet.ring import RingEvent
 from dissectors.frame import Frame
 
 _MOST = 8
+UNNAMED_TICK = 3 * MS
+"""How unevenly reads come through USB where nobody said what the adapter is."""
 
 
 @dataclass(slots=True)
 class HeldReads:
     """What was late in the newest frame, and whether it may be said.
 
-    `least_gap`: ns; frames of two senders are closer than that only where they came in one read.
+    `least_gap`: ns; frames of two senders are closer than that only where they came in one read. `margin`: ns that
+    times may be off although they are taken as exact.
     """
 
     least_gap: int
+    margin: int = 0
     _late: list[RingEvent] = field(default_factory=list)
     _before: Frame | None = None
 
@@ -33,6 +40,10 @@ class HeldReads:
         """Something was late in the newest frame."""
         if len(self._late) < _MOST:
             self._late.append(event)
+
+    def is_late(self, frame: Frame, before: Frame, limit: int) -> bool:
+        """Whether the time between two frames is over a limit (ns) whatever the adapter."""
+        return surely_over(frame, before, limit + self.margin)
 
     def settle(self, frame: Frame) -> Iterable[RingEvent]:
         """The next frame has come: give what was surely late, in order."""

@@ -40,6 +40,7 @@ class RingEventKind(Enum):
     FOR_ANOTHER = "answered what another station was asked"
     UNASKED = "sent without being asked, and never has the token"
     LATE_USE = "late to use the token"
+    LATE_ASKING = "late to use the token, and asked with it"
     GIVEN_UP = "used the token after it was given up"
     USED_BOTH = "used the token and its repeat"
     SLOW_SEARCH = "late to go on after a poll that nobody answered"

@@ -129,7 +129,7 @@ class RingQuestions:
                 self._unanswered_poll(asked, no, frame, source)
                 return False
             node.poll_reply.add(took)
-            if surely_over(frame, asked.frame, T_USAGE_DELAY):
+            if self._reads.is_late(frame, asked.frame, T_USAGE_DELAY):
                 self._reads.add(RingEvent(RingEventKind.LATE_POLL_REPLY, frame.start, no, source, destination, took))
             return True
         if asked.frame_type == _TEST:
@@ -143,7 +143,7 @@ class RingQuestions:
             return False
         node.replies += 1
         node.reply.add(took)
-        if surely_over(frame, asked.frame, T_REPLY_DELAY):
+        if self._reads.is_late(frame, asked.frame, T_REPLY_DELAY):
             self._reads.add(RingEvent(RingEventKind.LATE_REPLY, frame.start, no, source, destination, took))
         if frame_type == FrameType.REPLY_POSTPONED and not asked.free:
             self._postponed.append((source, destination, asked.frame.end))

@@ -9,8 +9,8 @@ bus was silent for 500 ms before, the token was lost and made anew (`lost_tokens
 
 from __future__ import annotations
 
-from dissectors.bacnet.frame_types import HEADER, FrameType
-from dissectors.bacnet.held_reads import HeldReads, surely_over
+from dissectors.bacnet.frame_types import EXPECTING, HEADER, FrameType
+from dissectors.bacnet.held_reads import UNNAMED_TICK, HeldReads
 from dissectors.bacnet.limits import BROADCAST, MAX_MASTER, T_NO_TOKEN, T_USAGE_DELAY, T_USAGE_TIMEOUT, TURNAROUND_BITS
 from dissectors.bacnet.lost_tokens import longest_wait, makes_token
 from dissectors.bacnet.repeated_token import RepeatedToken
@@ -26,7 +26,9 @@ from dissectors.line import Timing
 
 _HOLD_MAX = 64  # longest run of data frames that is counted by itself
 
-_TOKEN, _POLL = int(FrameType.TOKEN), int(FrameType.POLL_FOR_MASTER)  # plain numbers compare faster than members
+_TOKEN, _POLL, _TEST = map(  # plain numbers compare faster than members
+    int, (FrameType.TOKEN, FrameType.POLL_FOR_MASTER, FrameType.TEST_REQUEST)
+)
 AT_ONCE = frozenset(map(int, (FrameType.REPLY_TO_POLL_FOR_MASTER, FrameType.TEST_RESPONSE, FrameType.REPLY_POSTPONED)))
 """Answers that are sent at once or not at all: to the one that has the token."""
 
@@ -51,7 +53,7 @@ class TokenWatch:
         self._before: Frame | None = None  # the last good frame
         self._quiet_since: int | None = None  # end of the last event of any kind
         self._quiet_slack = 0  # of the last event
-        self._reads = HeldReads(self._least_gap)
+        self._reads = HeldReads(self._least_gap, 0 if timing.is_told else UNNAMED_TICK)
         self._unheard = UnheardFrames(self._tally, self._least_gap)
         self._questions = RingQuestions(self._tally, self._reads, self._unheard)
 
@@ -120,8 +122,9 @@ class TokenWatch:
                 if not self._doubt and not self._disturbed:
                     node.use.add(gap)
                     self._tally.enter(Happening.USE, no, source, gap)
-                    if surely_over(frame, self._token, T_USAGE_DELAY):
-                        self._late(RingEventKind.LATE_USE, no, frame, source, self._passed_by, gap)
+                    if self._reads.is_late(frame, self._token, T_USAGE_DELAY):
+                        what = RingEventKind.LATE_ASKING if _waits(frame) else RingEventKind.LATE_USE
+                        self._late(what, no, frame, source, self._passed_by, gap)
                 self._token = self._passed_by = None
             return
         if self._doubt and self._may_answer(frame, header):
@@ -313,3 +316,8 @@ class TokenWatch:
         self._holder = self._passed_by = self._token = self._second.of = self._got = None
         self._hold = 0
         self._unheard.forget()
+
+
+def _waits(frame: Frame) -> bool:
+    """Whether its sender waits for somebody then, so that the time to the next frame tells nothing."""
+    return frame.octets[3] != BROADCAST and (frame.octets[2] in EXPECTING or frame.octets[2] in (_POLL, _TEST))

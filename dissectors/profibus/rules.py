@@ -177,8 +177,8 @@ RULES: dict[str, Rule] = {
             Severity.NOTE,
             "requests refused",
             "A station answers with an error: service not activated (RS), no resources (RR), user error (UE). A "
-            "warning from 3 and 1 in 100 requests for data exchange on, without those that show that it left data exchange "
-            "and need not be at fault (PB007); other services a device need not have.",
+            "warning from 3 and 1 in 100 requests for data exchange on, without those that show that it left data "
+            "exchange and need not be at fault (PB007); other services a device need not have.",
             "a service that the device does not have, or one that it cannot do in its present state",
             "which service is refused, and in which state the slave is",
         ),

@@ -71,9 +71,16 @@ class Read:
         return finding
 
 
-def script(steps: Iterable[Step], latency: float = 0, line: LineSettings = LINE, *, has_times: bool = True) -> Read:
+def script(
+    steps: Iterable[Step],
+    latency: float = 0,
+    line: LineSettings = LINE,
+    *,
+    has_times: bool = True,
+    timing: Timing | None = None,
+) -> Read:
     """Each step is one read; steps of no silence at all come in one read with the one before."""
-    timing = Timing(line, int(latency * MS), has_times=has_times)
+    timing = timing or Timing(line, int(latency * MS), has_times=has_times)
     framer, tracker, observer = MSTP.framer(timing), MSTP.tracker(timing), MstpRingObserver(timing)
     chunks: list[Chunk] = []
     now = 10**18

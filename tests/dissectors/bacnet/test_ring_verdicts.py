@@ -9,6 +9,7 @@ from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.ring import RingEventKind
 from dissectors.findings import Severity
 from dissectors.frame import Flaw, Frame
+from dissectors.line import LineSettings, Timing
 from dissectors.tracker import Verdict
 from tests.dissectors.bacnet.ring_script import Step, data, found, poll, rounds, script, spoil, token
 
@@ -402,3 +403,30 @@ def test_a_token_to_itself_is_never_repeated():
     read = script([(4 + at % 3 * 12, token(3, 3)) for at in range(60)], 17.5)
     assert not read.graves()
     assert {one.code for one in read.findings} == {"MS107"}
+
+
+def _asks(late: tuple[int, ...], patience: float = 200) -> list[Step]:
+    """3 asks 12 with each second token, and `late` of the reads of its requests come 30 ms late; 12 takes long."""
+    steps: list[Step] = []
+    for at in range(60):
+        slow = 30 if at in late else 0
+        steps += [(5 + slow, data(3, 12, READ, expects=True)), (patience - slow, data(12, 3, VALUE)), (3, token(3, 12))]
+        steps += [*rounds(1, 12, 3, use=2), *rounds(1, 3, 12, use=2)]
+    return steps
+
+
+def test_a_request_that_was_read_late_makes_nobody_slow():
+    """Nothing comes behind it for so long that the read may have been late."""
+    assert not script(_asks((20, 30, 40, 50))).graves()
+
+
+def test_requests_that_are_late_so_often_are_the_station_s():
+    assert ("MS103", "MAC 3") in script(_asks(tuple(range(5, 55, 2)))).graves()
+
+
+def test_a_millisecond_over_the_limit_says_nothing_of_an_adapter_that_nobody_named():
+    steps = [step for at in range(120) for step in rounds(1, 3, 12, use=16.5 if at % 4 == 0 else 3)]
+    unnamed = Timing(LineSettings(38400), 0, is_told=False)
+    assert not {code for code, _ in script(steps, timing=unnamed).graves()}
+    slow = [step if at % 8 else (21.0, step[1]) for at, step in enumerate(steps)]
+    assert ("MS103", "MAC 3") in script(slow, timing=unnamed).graves()
