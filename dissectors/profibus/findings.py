@@ -27,6 +27,9 @@ _URGENT_MOST = 20
 _LEAST_FRESH = 2
 """Requests without answer, repeats at once aside, that are more than a look whether somebody is there."""
 
+_ONE_SILENCE = NS_PER_S // 2
+"""Slaves that leave within that time left in the same silence of their master."""
+
 _ONE_STATION = 0.9
 _TOLERANCE = 5
 """Bit times by which a measured answer time may be off."""
@@ -46,6 +49,7 @@ class ProfibusFindings:
         self.records: dict[int, RequestsRecord] = defaultdict(RequestsRecord)
         self._noted: dict[tuple[Notice, int], Tally] = defaultdict(Tally)
         self._diagnosed: dict[int, dict[str, Tally]] = defaultdict(lambda: defaultdict(Tally))
+        self._silent: dict[int, int] = {}  # when a slave last left because that master was silent, ns
         self._damaged = Tally()
         self._frames = 0
         self._passed: dict[int, int] = defaultdict(int)  # tokens to each master
@@ -113,8 +117,10 @@ class ProfibusFindings:
                 self._diagnosed[address][code].add(time, no)
         elif what is Notice.LOCKED:
             self._diagnosed[address]["PB011"].add(time, no)
-        else:
+        elif what is not Notice.MASTER_SILENT or time - self._silent.get(address, time - _ONE_SILENCE) >= _ONE_SILENCE:
             self._noted[what, address].add(time, no)
+        if what is Notice.MASTER_SILENT:
+            self._silent[address] = time
 
     @staticmethod
     def _codes_of(slave: SlaveView) -> Iterator[str]:
@@ -286,6 +292,9 @@ class ProfibusFindings:
                 seen = f"station {address} sent {times(tally.count)} while another master held the token"
                 often = tally.count >= _SHARE * self._told[address]
                 yield tally.found(RULES["PB015"], BUS, seen, Severity.ERROR if often else Severity.NOTE)
+            elif what is Notice.MASTER_SILENT:
+                seen = f"asked nothing for longer than the watchdog of its slaves {times(tally.count)}; they left then"
+                yield tally.found(RULES["PB019"], station(address), seen, None if tally.count > 1 else Severity.NOTE)
             elif what is Notice.CLEAR:
                 yield tally.found(RULES["PB012"], station(address), self._clear_seen(address))
             elif what is Notice.CLEAR_PERHAPS and (Notice.CLEAR, address) not in self._noted:

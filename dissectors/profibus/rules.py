@@ -193,6 +193,16 @@ RULES: dict[str, Rule] = {
             "a slow device, a repeater or a converter in between",
             "MaxTsdr in the GSD file of the device, and the slot time of the project",
         ),
+        Rule(
+            "PB019",
+            Severity.WARNING,
+            "master silent for too long",
+            "A master asked nothing for longer than the watchdog that it had given its slaves, by the smallest reading "
+            "of the time and with nothing damaged, and a slave had left data exchange by then, as it must. A single "
+            "time it is only noted.",
+            "the controller was stopped, restarted or too busy, or the token came round too late",
+            "what the controller did then; the watchdog time of the project against the time of a round",
+        ),
     )
 }
 """The catalogue, by code."""

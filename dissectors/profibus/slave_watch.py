@@ -126,6 +126,12 @@ class SlaveView:
         watchdog = self.given.watchdog_ms
         return watchdog is not None and self.silence >= watchdog * MS
 
+    def is_starved(self, doubt: int) -> bool:
+        """Whether nothing but the silence of its master is why it left data exchange just now. `doubt`: ns by which
+        times may be off."""
+        watchdog = None if self.given is None else self.given.watchdog_ms
+        return not self.is_blurred and watchdog is not None and self.silence - doubt >= watchdog * MS
+
     def become(self, state: SlaveState, time: int) -> None:
         """Take a state."""
         if state is self.state:

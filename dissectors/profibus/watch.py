@@ -35,6 +35,7 @@ class Notice(Enum):
     WOKE = auto()  # the same by who had it until it was given up for silent, and goes on as if nothing had been
     DROP = auto()  # a slave left data exchange by itself
     STARVED = auto()  # the same, where something else than the slave may be why
+    MASTER_SILENT = auto()  # a master asked nothing for longer than the watchdog of a slave, which left
     DIAGNOSIS = auto()  # a slave told its diagnosis
     LOCKED = auto()  # the same, to a master that wants the slave; it belongs to another one
     CLEAR = auto()  # data is exchanged while the master is in Clear, and has been for CLEAR_LONG
@@ -98,6 +99,7 @@ class BusWatch:
         self._wasted = 0
         self._looked: Ring | None = None
         self._heard = self._slack = 0  # end of the row before, and by how much it may have been earlier
+        self._timing = timing
         self._least_claim = timing.line.bits(_LEAST_CLAIM)
         self._holder: int | None = None
         self._interruption: _Interruption | None = None  # until it is known whether a token was missed at this tap
@@ -288,6 +290,8 @@ class BusWatch:
         fell = slave.answered(service, asked, answer, frame.end)
         if fell:
             self._tell(Notice.STARVED if slave.is_excused else Notice.DROP, asked.destination, no, frame.start)
+            if self._timing.has_times and slave.is_starved(self._timing.latency):
+                self._tell(Notice.MASTER_SILENT, asked.source, no, frame.start)
         slave.heard(slave.state is SlaveState.EXCHANGE)
         if service is Service.DIAGNOSIS:
             self._tell(Notice.DIAGNOSIS, asked.destination, no, frame.start)
