@@ -1,8 +1,8 @@
 """Other settings that fit octets which make no frames with those of the capture. Pure, bounded.
 
 Asked is, of a sample: another protocol (every one that the registry knows); seven bits read as eight; fewer data bits
-than the bus has; every bit inverted; a bus that is slower or faster. What fits is named with its evidence; where
-nothing does, nothing is named.
+than the bus has; line ends that a terminal changed; every bit inverted; a bus that is slower or faster. What fits is
+named with its evidence; where nothing does, nothing is named.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from dissectors import registry
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.analysis.autodetect import COVERED_LEAST, FOUND_FRAMES, LIKELY_BITS, CandidateEvidence, Candidature
+from sniff.analysis.line_ends import as_sent
 from sniff.analysis.slower_bus import slower_by
 
 SAMPLE_OCTETS = 3000
@@ -78,6 +79,7 @@ def _fits(sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: s
         yield _as_protocol(
             found, "these octets read", f"the bus runs {found.protocol}", f"read it with -p {found.protocol}"
         )
+    yield from _by_line_ends(sample, line, latency)
     inverted = _changed(sample, 0xFF, 0xFF)
     if (found := _convincing(_evidence(inverted, line, latency))) is not None:
         yield _as_protocol(
@@ -88,6 +90,16 @@ def _fits(sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: s
         )
     yield from _by_values(sample, line)
     yield from _by_rate(sample, line, has_rate)
+
+
+def _by_line_ends(sample: Sequence[Chunk], line: LineSettings, latency: int) -> Iterator[Fit]:
+    """Protocols of text whose CR a terminal took: the reading that leaves least over."""
+    found = [(one, _convincing(_evidence(one.chunks, line, latency))) for one in as_sent(sample)]
+    fitting = [(one, reading) for one, reading in found if reading is not None]
+    if fitting:
+        ends, reading = max(fitting, key=lambda one: one[1].covered)
+        settle = "record again with the port set raw (`stty raw`), or with `sniff485 record`"
+        yield _as_protocol(reading, f"{ends.how} these octets read", ends.why, settle)
 
 
 def _as_protocol(found: Candidature, how: str, means: str, settle: str) -> Fit:

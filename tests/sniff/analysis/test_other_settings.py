@@ -10,6 +10,7 @@ import pytest
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from dissectors.modbus.envelope import seal_ascii, seal_rtu
+from dissectors.n2.envelope import make_command
 from sniff.analysis.other_settings import Fit, lacking_bits, what_fits
 from sniff.analysis.slower_bus import slower_by
 from sniff.simulation.collision import low_times, receive
@@ -141,3 +142,38 @@ def test_octets_without_their_upper_bit_spoil_frames_and_leave_others_good() -> 
     assert lacking_bits(sample, line, {*values, 0x80}, damaged=4, rows=12) is None
     assert lacking_bits(sample, line, values, damaged=1, rows=12) is None  # noise
     assert lacking_bits(sample[:4] * 3, line, values, damaged=4, rows=12) is None  # the same few frames, by chance so
+
+
+def _texts() -> list[bytes]:
+    return [seal_ascii(frame[:-2]) for frame in polls()]
+
+
+@pytest.mark.parametrize("in_one", [True, False])
+@pytest.mark.parametrize(
+    ("changed", "how", "why"),
+    [
+        ((b"\r", b"\n"), "with CR LF for each LF LF these octets read as modbus-ascii", "icrnl"),
+        ((b"\r", b""), "with CR LF for each LF these octets read as modbus-ascii", "igncr"),
+    ],
+)
+def test_line_ends_that_a_terminal_changed(changed: tuple[bytes, bytes], how: str, why: str, in_one: bool) -> None:
+    """As `cat` saves them from a port that nobody set raw."""
+    texts = [text.replace(*changed) for text in _texts()]
+    bursts = texts if in_one else [bytes((octet,)) for text in texts for octet in text]
+    told = what_fits(chunks(bursts, gap=50 * MS if in_one else MS // 10), LINE, 0, "modbus-ascii")
+    assert told is not None
+    assert told.seen.startswith(how)
+    assert why in told.means
+    assert "stty raw" in told.next
+
+
+def test_a_protocol_that_ends_with_cr_alone() -> None:
+    commands = [make_command(f"{at % 5 + 1:02X}1109{at:02X}") for at in range(24)]
+    told = what_fits(chunks(command.replace(b"\r", b"\n") for command in commands), LINE, 0, "n2")
+    assert told is not None
+    assert told.seen.startswith("with CR for each LF these octets read as n2 with good checks (24 frames hold 100%")
+
+
+def test_lines_of_text_are_no_protocol_whatever_ends_them() -> None:
+    lines = [f"temperature {at * 7 % 50} C, all is well\n".encode() for at in range(40)]
+    assert fit(lines) is None
