@@ -74,27 +74,13 @@ def sentences(ring: Ring) -> list[str]:
     """The ring as a whole: order, loop time, waste, what cannot be judged, what happened, advice."""
     order = ring.order
     said = [f"ring of {len(order)}: {' → '.join(map(str, (*order, order[0])))}" if order else "no closed ring seen"]
-    if not ring.timing.has_times:
-        return [
-            *said,
-            f"{counted(ring.frames, 'frame')}; when they came is not known",
-            *_happened(ring),
-            *ring.advice(),
-        ]
-    said += [
-        f"{ring.frames} frames in {ring.span / 1e9:.1f} s; bus load {ring.load:.1%}",
-        f"unanswered polls for masters take {ring.poll_waste_share:.1%} of the time",
-    ]
-    said += _users(ring)
-    predicted = ring.predicted_loop
-    if predicted is not None:
-        least = "" if ring.limits["token use"] else "at least "
-        said.append(f"an idle round should take {least}{milliseconds(predicted)}")
+    untimed = [f"{counted(ring.frames, 'frame')}; when they came is not known"]
+    said += _of_time(ring) if ring.timing.has_times else untimed
     bound = milliseconds(ring.timing.latency)
     said += [
         f"{name} against the standard's limit: not measurable, this adapter may hold octets back up to {bound}"
         for name, possible in ring.limits.items()
-        if not possible
+        if not possible and ring.timing.has_times
     ]
     return said + _happened(ring) + list(ring.advice())
 
@@ -104,6 +90,20 @@ def _happened(ring: Ring) -> list[str]:
     for (what, _), happened in ring.happened.items():
         counts[what] = counts.get(what, 0) + happened.count
     return [f"{count} × {what.value}" for what, count in counts.items() if count]
+
+
+def _of_time(ring: Ring) -> list[str]:
+    """How the time is used."""
+    said = [
+        f"{ring.frames} frames in {ring.span / 1e9:.1f} s; bus load {ring.load:.1%}",
+        f"unanswered polls for masters take {ring.poll_waste_share:.1%} of the time",
+        *_users(ring),
+    ]
+    predicted = ring.predicted_loop
+    if predicted is not None:
+        least = "" if ring.limits["token use"] else "at least "
+        said.append(f"an idle round should take {least}{milliseconds(predicted)}")
+    return said
 
 
 def _users(ring: Ring) -> list[str]:

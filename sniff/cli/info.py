@@ -88,14 +88,15 @@ class _Happened:
 
 def _as_json(path: str, capture: Capture, session: Session, summary: Summary, foreign: Foreign) -> dict[str, Any]:
     complete = capture.completeness()
+    first, last = (summary.load.first, summary.load.last) if session.has_times else (None, None)
     return {
         "file": path,
         "complete": complete.whole,
         "completeness": complete.text,
         "kept": _kept(capture, session),
-        "first": iso(summary.load.first) if summary.load.first is not None else None,
-        "last": iso(summary.load.last) if summary.load.last is not None else None,
-        "seconds": summary.seconds,
+        "first": iso(first) if first is not None else None,
+        "last": iso(last) if last is not None else None,
+        "seconds": summary.seconds if session.has_times else None,
         "protocol": None if "protocol" in session.unknown else session.protocol,
         "line": None if "line" in session.unknown else str(session.line),
         "line_assumed": session.line_is_assumed,
@@ -108,7 +109,7 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary, fo
         "frames": summary.frames,
         "damaged": summary.damaged,
         "noise_octets": summary.noise,
-        "load": summary.load.overall(),
+        "load": summary.load.overall() if session.has_times else None,
         "damages": ranked(summary.damages),
         "second_protocol": None if foreign is None else {"protocol": foreign[0].name, "frames": foreign[1]},
         "kinds": ranked(summary.kinds),
@@ -116,7 +117,7 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary, fo
         "line_errors": ranked(summary.marks),
         "line_events": {kind.value: count for kind, count in summary.events.items()},
         "verdicts": ranked({verdict.value: count for verdict, count in summary.verdicts.items()}),
-        "response_ms": _response_times(summary),
+        "response_ms": _response_times(summary) if session.has_times else None,
         "nodes": [_node_as_json(node) for node in summary.nodes.present()],
         "polled_only": summary.nodes.absent(),
     }

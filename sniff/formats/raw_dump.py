@@ -7,12 +7,13 @@ nothing and frames are found by what is in them.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dissectors.frame import Chunk
 from sniff.engine.capture import CaptureError
-from sniff.engine.session import Completeness, Item, LineEvent, Session
+from sniff.engine.session import NO_TIMES, Completeness, Item, LineEvent, Session
 from sniff.formats.contents import PUTTY
 from sniff.formats.files import explain, open_capture
 from sniff.formats.records import foreign_session
@@ -41,7 +42,8 @@ class RawDump:
             raise CaptureError(f"{path}: empty file")
         heading = PUTTY.match(start)
         self._begin = heading.end() if heading is not None else 0
-        self.session: Session = foreign_session(str(path), None, 0, "raw dump")
+        told = foreign_session(str(path), None, 0, "raw dump")
+        self.session: Session = replace(told, adapter=replace(told.adapter, latency_from=NO_TIMES))
 
     def items(self) -> Iterator[Item]:
         """The octets in the order of the file, back to back. Raises CaptureError."""

@@ -20,11 +20,12 @@ LOG = "01 03 00 00 00 02 C4 0B\n01 03 04 00 01 00 02 2A 32\n" * 8
 Run = Callable[..., Ran]
 
 
-@pytest.fixture(params=["log", "mcap"])
+@pytest.fixture(params=["log", "mcap", "bin"])
 def log(request: pytest.FixtureRequest, tmp_path: Path, sniff485: Run) -> Path:
-    """As it was written, and converted."""
+    """As it was written, converted, and as octets and nothing else."""
     written = tmp_path / "bare.log"
     written.write_text(LOG)
+    (tmp_path / "bare.bin").write_bytes(bytes.fromhex(LOG))
     if request.param == "mcap":
         assert sniff485("convert", written, tmp_path / "bare.mcap").code == 0
     return tmp_path / f"bare.{request.param}"
@@ -61,6 +62,14 @@ def test_values_have_no_ages(log: Path, sniff485: Run) -> None:
     assert {one["time"] for one in every} == {None}
     polls = [json.loads(line) for line in sniff485("stats", "polls", "--json", log).out.splitlines()]
     assert {one[name] for one in polls for name in ("every ms", "± ms", "first", "last")} == {None}
+
+
+def test_info_has_no_span_and_no_load(log: Path, sniff485: Run) -> None:
+    said = sniff485("info", log).out
+    assert "does not say when anything came" in said
+    assert not re.search(r"load|p50|1970", said)
+    told = json.loads(sniff485("info", "--json", log).out)
+    assert {told[name] for name in ("first", "last", "seconds", "load", "response_ms")} == {None}
 
 
 def test_load_is_refused(log: Path, sniff485: Run) -> None:
