@@ -3,6 +3,9 @@ PYTHON ?= python3
 VENV   ?= .venv
 BIN     = $(VENV)/bin
 
+# One more than there are cores: a fifth of the tests mostly wait, for a port, a broker, a timeout.
+WORKERS ?= $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
+
 # Many processes of ours begin in the tests: what one of them compiled, the next need not.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -12,7 +15,7 @@ demo: $(VENV)/.demo
 	$(BIN)/sniff485 demo $(ARGS)
 
 test: $(VENV)/.test
-	$(BIN)/python -m pytest -n auto --dist worksteal $(ARGS)
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(ARGS)
 
 lint: $(VENV)/.test
 	$(BIN)/ruff check .
