@@ -94,10 +94,16 @@ class Echoes:
         """Whether octets are the begin of the request, given back at once and cut short."""
         if not is_begin_of(octets, request.request.frame.octets):
             return False
-        gap = request.gap(start)
+        gap = max(0, start - request.last_end)
         if request.sure:
             return gap < self.limit or gap < AT_ONCE
         return gap < self.limit and self.usual is not False  # a confirmation may be cut short, too
+
+    def is_cut_in_pieces(self, request: Exchange) -> bool:
+        """The same of octets that came in pieces: of an adapter that nobody named, the silence between them proves
+        nothing."""
+        last = max(0, request.pieces_until - request.last_end)
+        return last < AT_ONCE and self.is_cut(request, request.pieces, request.pieces_from)
 
     def is_cut_behind(self, last: Exchange | None, seen: Seen, end: int | None) -> bool:
         """Whether a frame is the begin of a request that was answered by then, directly behind that answer (`end`):

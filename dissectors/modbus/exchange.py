@@ -53,6 +53,8 @@ class Exchange:
     broadcast directly before it. `may_be_answer`: it has the shape of an answer, and a request may have been missed.
     `since`: the first request to this unit that waited with it, one directly behind the other.
     `outlives`: it was given up, and one directly behind it answered: which of the two, nobody knows.
+    `pieces`: octets behind it that are no good frame, put together as they came; `pieces_from`: ns, when they began;
+    `pieces_until`: when the newest of them did.
     `waited`: ns, until the next request came, where that closed it.
     """
 
@@ -75,6 +77,9 @@ class Exchange:
     waited: int | None = None
     since: int = 0
     outlives: bool = False
+    pieces: bytes = b""
+    pieces_from: int = 0
+    pieces_until: int = 0
     octets: bytes = field(init=False)  # unit and PDU of the request
     unit: int = field(init=False)  # the unit asked, 0 … 255
     end: int = field(init=False)  # of the request, ns
@@ -109,6 +114,13 @@ class Exchange:
     def last_end(self) -> int:
         """End of the newest frame that may be this request, ns."""
         return self.copies[-1].frame.end if self.copies else self.end
+
+    def put_together(self, octets: bytes, start: int) -> None:
+        """Take octets behind it that are no good frame: where reads come late, an echo may come in pieces."""
+        if len(self.pieces) < len(self.request.frame.octets):
+            self.pieces_from = self.pieces_from if self.pieces else start
+            self.pieces_until = start
+            self.pieces += octets
 
     def gap(self, start: int) -> int:
         """From the end of the request to `start`, ns, never negative."""

@@ -91,6 +91,7 @@ class Exchanges:
         if request is None:
             return
         self.open, self.last = None, request
+        self.forgive_pieces(request)
         if request is self.crossed:  # nobody answered it: what came into the wait for it may have been the next request
             self.copies_come_late = False
         if verdict is None:
@@ -114,6 +115,11 @@ class Exchanges:
         if verdict in (Verdict.NO_RESPONSE, Verdict.OPEN):  # a first frame that waited may be answered late, too
             self.given_up.append(request)
         self.closed.append(request.close(verdict))
+
+    def forgive_pieces(self, request: Exchange) -> None:
+        """What seemed a damaged answer is the request itself, given back in pieces and cut short."""
+        if request.garble is not None and self._echoes.is_cut_in_pieces(request):
+            request.garble, request.echoed = None, True
 
     def _may_be_copy(self, request: Exchange) -> bool:
         """Whether what looks like a request and got nothing may be an answer: where requests have no echo, one that had

@@ -15,6 +15,7 @@ from dissectors import stretches
 from dissectors.columns import ROLES
 from dissectors.frame import Frame, Role
 from dissectors.line import MS
+from dissectors.modbus.cut_echo import CutEcho
 from dissectors.modbus.envelope import RTU_NAME
 from dissectors.modbus.exchanged import Exchanged
 from dissectors.modbus.gap_columns import hurried, see_close, see_spacing, silences, turns_before
@@ -79,6 +80,7 @@ class _Judging:
         judge.gaps.pass_by(last.event, int(rows.frames.start[stretch.stop - 2]))
         judge.torn.see(last.no, last.event, None, is_good_frame=True)
         judge.newest = int(closed.id[end - 1])
+        judge.given_back = CutEcho()
 
     def _count(self, stretch: slice, which: slice) -> None:
         """What is counted of frames."""

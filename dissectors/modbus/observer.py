@@ -13,6 +13,7 @@ from dissectors.frame import Damage, Flaw, Frame, Role
 from dissectors.line import MS
 from dissectors.modbus.asked import AskedRequest
 from dissectors.modbus.envelope import RTU_NAME, rtu_check
+from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.functions import COPIED, EXCEPTION_BIT, FUNCTIONS
 from dissectors.modbus.learned_timing import READ
 from dissectors.modbus.limits import ILLEGAL, beyond_limits
@@ -45,6 +46,9 @@ class ModbusFindings(RowObserver):
         stray, flaw = self.stray.pop(transaction.id, b""), self.flaws.pop(transaction.id, None)
         ended = self.bad_ends.pop(transaction.id, None)
         verdict = transaction.verdict
+        if stray and asked is not None and self._came_back_in_pieces(asked, stray, verdict):
+            self.seen.cut_echoes.add(transaction.start, asked.no)
+            stray, flaw, ended = b"", None, None
         if verdict in _SETTLED_ELSEWHERE:
             if verdict is Verdict.ECHO:
                 self.seen.echoes += 1
@@ -117,6 +121,10 @@ class ModbusFindings(RowObserver):
         request, response = transaction.request or transaction.response or 0, transaction.response or 0
         is_noise = not response and transaction.verdict is Verdict.DAMAGED_ANSWER
         return self.late.among(request, max(request, response) + 1 + is_noise)
+
+    def _came_back_in_pieces(self, asked: AskedRequest, stray: bytes, verdict: Verdict) -> bool:
+        """Whether what came behind a request is its begin, cut short, and was no answer by the times of its pieces."""
+        return verdict is not Verdict.DAMAGED_ANSWER and is_begin_of(stray, asked.frame.octets)
 
     def _may_be_next_request(self, transaction: Transaction, answer: bytes) -> bool:
         """Whether a second answer may be the master's next request, the same again: it, or the frame before it, was

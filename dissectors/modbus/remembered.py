@@ -9,6 +9,7 @@ from dissectors.line import MS, Timing
 from dissectors.modbus.asked import AskedRequest
 from dissectors.modbus.bare_ends import BareEnds
 from dissectors.modbus.bus_record import BusRecord
+from dissectors.modbus.cut_echo import CutEcho
 from dissectors.modbus.gaps import Gaps
 from dissectors.modbus.late_rows import LateRows
 from dissectors.modbus.learned_timing import LearnedTiming
@@ -46,6 +47,7 @@ class Remembered:
         self.asked: dict[int, AskedRequest] = {}  # by transaction
         self.open: AskedRequest | None = None  # the newest request, while nothing has come after it
         self.broadcast: AskedRequest | None = None  # likewise
+        self.given_back = CutEcho()  # behind the newest frame that may be a request
         self.codes: dict[int, int] = {}  # exception codes by transaction
         self.answers: dict[int, bytes] = {}  # good answers by transaction
         self.elsewhere: dict[int, int] = {}  # requests (by frame) that another unit answered, and which

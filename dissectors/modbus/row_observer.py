@@ -5,8 +5,8 @@ from __future__ import annotations
 from dissectors.frame import Event, Frame, Header, Noise, Role
 from dissectors.line import MS
 from dissectors.modbus.asked import AskedRequest
+from dissectors.modbus.cut_echo import CutEcho
 from dissectors.modbus.envelope import readable_adu
-from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT
 from dissectors.modbus.long_silences import SILENCE_LEAST
 from dissectors.modbus.remembered import (
@@ -38,8 +38,7 @@ class RowObserver(Remembered):
         gap = event.start - seen.now
         seen.first = event.start if seen.first is None else seen.first
         seen.now = max(seen.now, event.end)
-        if self._is_cut_echo(event):
-            seen.cut_echoes.add(event.start, no)
+        if self._is_cut_echo(no, event):
             return
         is_behind_silence = gap >= SILENCE_LEAST and self.silences.is_one(gap)
         if is_behind_silence:
@@ -59,6 +58,8 @@ class RowObserver(Remembered):
         octets = readable_adu(event)
         if not header.ok:
             self._see_broken(no, event, octets)
+        else:
+            self._await_cut_echo(event, header, placement)
         self.gaps.see(no, event, header, placement)
         self.ends.see(no, event, header, placement)
         if placement.role is Role.RESPONSE:
@@ -209,10 +210,16 @@ class RowObserver(Remembered):
         if len(self.seen.broken_in) < HASTY_KEPT:
             self.seen.broken_in.append((gap + asked.frame.slack, asked.unit, event.start, asked.no, no))
 
-    def _is_cut_echo(self, event: Event) -> bool:
-        """Whether it is the begin of the request before it, given back at once and cut short."""
-        asked = self.open
-        if asked is None or not is_begin_of(event.octets, asked.frame.octets):
+    def _is_cut_echo(self, no: int, event: Event) -> bool:
+        """Whether it is the begin of the request before it, given back at once and cut short, or goes on with that."""
+        is_first = not self.given_back.octets
+        if not self.given_back.takes(event, AT_ONCE):
             return False
-        gap = max(0, event.start - asked.frame.end)
-        return gap < (AT_ONCE if asked.header.role is Role.REQUEST else self.timing.t35)
+        if is_first:
+            self.seen.cut_echoes.add(event.start, no)
+        return True
+
+    def _await_cut_echo(self, frame: Frame, header: Header, placement: Placement) -> None:
+        """A good frame: what stands behind it may be its own begin, where it may be a request."""
+        within = AT_ONCE if header.role is Role.REQUEST else self.timing.t35
+        self.given_back = CutEcho() if placement.role is Role.RESPONSE else CutEcho(frame, within)

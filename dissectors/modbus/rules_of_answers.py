@@ -137,7 +137,7 @@ ANSWER_RULES = (
         "the adapter gives back what it sends, and the program that wrote this capture stopped reading too soon: it "
         "waited for as many octets as the answer has; the answer itself may have come and was not read",
         "switch the adapter's echo off, or let the program read its echo away before the answer",
-        explains=("MB001", "MB002", "MB003", "MB004", "MB104", "MB105", "LN205", *_OF_DAMAGE),
+        explains=("MB001", "MB002", "MB003", "MB004", "MB104", "MB105", *("LN203", "LN204", "LN205"), *_OF_DAMAGE),
     ),
     Rule(
         "MB014",

@@ -287,6 +287,7 @@ class ModbusTracker(TrackerMemory):
         """A damaged frame: in answer to the open request, a damaged request, or neither."""
         request = self._held.open
         if request is not None and self._echoes.is_cut(request, seen.frame.octets, seen.frame.start):
+            request.put_together(seen.frame.octets, seen.frame.start)
             return self._echo(seen, f"the echo ends after {len(seen.frame.octets)} octets")
         error = seen.header.error or "damaged"
         if request is None:
@@ -295,6 +296,7 @@ class ModbusTracker(TrackerMemory):
             if seen.header.role is Role.RESPONSE:
                 return self._answer_apart(seen, Verdict.UNSOLICITED)
         elif self._is_damaged_answer(request, seen):
+            request.put_together(seen.frame.octets, seen.frame.start)
             if request.garble is None:
                 is_whole = len(seen.octets) == len(request.octets) and seen.octets[:2] == request.octets[:2]
                 request.garble = Garble(seen.no, seen.frame.end, error, is_whole)
@@ -306,6 +308,7 @@ class ModbusTracker(TrackerMemory):
         if request is None or not isinstance(noise, Noise):
             return
         request.disturbed = True
+        request.put_together(noise.octets, noise.start)
         if self._echoes.is_cut(request, noise.octets, noise.start):
             request.echoed = True
             return
@@ -357,6 +360,7 @@ class ModbusTracker(TrackerMemory):
 
     def _answer(self, request: Exchange, seen: Seen, why: str | None) -> Placement:
         self._learn_from_answer(request, seen, why)
+        self._held.forgive_pieces(request)
         self._held.answered.append(request)
         self._held.drop_chain(Verdict.NO_RESPONSE)
         self._held.note_answer(request)
