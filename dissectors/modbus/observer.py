@@ -330,7 +330,9 @@ class ModbusFindings(RowObserver):
         lost = self.lost.pop(transaction.of or 0, None)
         if lost is not None:
             station.forgive(lost)
-            waited = self.waits.get(lost.no, AT_ONCE)
+            waited, ended_by = self.waits.get(lost.no, (AT_ONCE, None))
+            if ended_by in self.seen.late_frames:
+                return  # what ended the wait was no request, but another late answer
             if lost.no in self.hasty:
                 self.seen.crossed.add(transaction.start, lost.no, transaction.response)
                 return

@@ -66,7 +66,7 @@ class Remembered:
         self.torn = TornFrames()
         self.bad_ends: dict[int, tuple[int, int, Frame]] = {}  # damaged answers (station, row), by transaction
         self.marked: deque[int] = deque(maxlen=64)  # transactions with line errors in what came in answer
-        self.waits: dict[int, int] = {}  # by request that nothing followed: until the next one, ns
+        self.waits: dict[int, tuple[int, int]] = {}  # by request that nothing followed: ns until the next one, and that
         self.unheard: deque[int] = deque(maxlen=LOST_KEPT)  # requests after which the master went on as after answers
         self.waited_for: deque[int] = deque(maxlen=LOST_KEPT)  # those for which it waited longer than that
         self.hasty: deque[int] = deque(maxlen=LOST_KEPT)  # those after which another came sooner than that

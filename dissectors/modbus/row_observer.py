@@ -129,7 +129,7 @@ class RowObserver(Remembered):
         if turn is not None:
             kind = self.hasty if gap < turn[0] else self.unheard if gap <= turn[1] else self.waited_for
             kind.append(before.no)
-        self.waits[before.no] = gap
+        self.waits[before.no] = gap, asked.no
         if len(self.waits) > LOST_KEPT:
             del self.waits[next(iter(self.waits))]
         if len(self.seen.hasty) < HASTY_KEPT:

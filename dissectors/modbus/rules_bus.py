@@ -199,12 +199,12 @@ def _of_masters(seen: BusRecord) -> Iterator[Finding]:
     """Requests into the wait of another, sooner than the station asked has ever answered.
 
     An answer that this tap missed cannot have come before, and a master that never waits sends after the same time
-    always: both are left out.
+    always: both are left out. So is what turned out to be a late answer, and no request.
     """
     alive = {unit: s for unit, s in seen.stations.items() if s.answered >= 3 and 2 * s.answered > s.asked}
 
     def too_soon(row: tuple[int, int, int, int, int]) -> bool:
-        return row[1] in alive and 10 * row[0] < 9 * alive[row[1]].times.soonest()
+        return row[4] not in seen.late_frames and row[1] in alive and 10 * row[0] < 9 * alive[row[1]].times.soonest()
 
     hasty, broken_in = list(filter(too_soon, seen.hasty)), list(filter(too_soon, seen.broken_in))
     gaps = sorted(row[0] for row in (*hasty, *broken_in))

@@ -68,3 +68,12 @@ def test_whoever_is_asked_by_one_that_did_not_wait_speaks_into_nothing(bus):
     for _ in range(6):
         polls(bus.say(POLL).say(PANEL, 0).damage(FEW + "00" * 6, 8), 12)
     assert not any(one.code == "MB106" for one in findings_of(bus))
+
+
+def test_whose_answer_only_another_late_one_came_before_is_not_late(paper_bus):
+    """Both read late, and apart: what came into the wait for station 1 was no request of a master that gave up."""
+    bus = paper_bus(latency=52_500_000)
+    write, poll = "030600010009", "010300000001"
+    for value in range(4):
+        bus.say(write, 1000).say(poll, 1000).say(write, 55).say(f"01030200{value:02x}", 40)
+    assert graves_of(bus) == {("MB103", "station 3")}
