@@ -36,6 +36,7 @@ FEW_INTERVALS, LONG_PERIOD = 5, 10
 """So many intervals are enough when all lie on a grid of so many ms or more, which chance alone hardly does."""
 
 LEAST_SPLITS = 3.0
+LEAST_WHOLE = 2
 HURRIED_LEAST = 100_000  # ns
 HURRIED_SHARE = 20
 ON_GRID = 0.85
@@ -214,7 +215,9 @@ def _fits(pairs: Sequence[tuple[int, int]], period: int, char: int) -> int | Non
     apart = [(interval, count) for interval, count in pairs if abs(interval - period) <= tolerance]
     if expected < LEAST_SPLITS or len(apart) < 0.4 * expected:
         return None
-    return on_grid[int(0.95 * (len(on_grid) - 1))] if _ends_anywhere(apart, period, tolerance, char) else None
+    if not (_ends_anywhere(apart, period, tolerance, char) or _is_whole_elsewhere(pairs, period, tolerance)):
+        return None
+    return on_grid[int(0.95 * (len(on_grid) - 1))]
 
 
 def _ends_anywhere(apart: Sequence[tuple[int, int]], period: int, tolerance: int, char: int) -> bool:
@@ -236,6 +239,20 @@ def _ends_anywhere(apart: Sequence[tuple[int, int]], period: int, tolerance: int
         return False
     as_sent = sum(abs(interval - count * char) <= max(tolerance, char // 4) for interval, count in apart)
     return 2 * as_sent <= len(apart)
+
+
+def _is_whole_elsewhere(pairs: Sequence[tuple[int, int]], period: int, tolerance: int) -> bool:
+    """Whether reads one period apart hold together what others held alone: one frame, cut where the period ended. Where
+    a master keeps a rhythm that goes well with the period, it is cut at the same place each time."""
+    follows = [abs(interval - period) <= tolerance for interval, _ in pairs]
+    alone, together = Counter[int](), Counter[int]()
+    for place, (_, count) in enumerate(pairs):
+        if follows[place]:
+            together[pairs[place - 1][1] + count if place and not follows[place - 1] else 0] += 1
+        elif place + 1 == len(pairs) or not follows[place + 1]:
+            alone[count] += 1
+    cut = sum(times for size, times in together.items() if alone[size] >= LEAST_WHOLE)
+    return cut >= FEW_INTERVALS and 4 * cut >= 3 * together.total()
 
 
 def _off(interval: int, period: int) -> int:

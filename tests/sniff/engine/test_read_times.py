@@ -160,3 +160,25 @@ def test_what_was_heard_after_a_change_of_settings_says_nothing(tmp_path: Path) 
         for number in range(1, 30):
             writer.write(Chunk(number * 20 * MS, bytes(100)))
     assert read(path).session.adapter.latency == 0
+
+
+def turns(*turn: tuple[int, int]) -> list[tuple[int, int]]:
+    """Reads of the same turn again and again: (ms since the read before, octets)."""
+    time, reads = 0, []
+    for interval, octets in turn * 6:
+        time += interval * MS
+        reads.append((time, octets))
+    return reads
+
+
+def test_a_timer_shows_that_cuts_frames_at_one_place_where_others_come_whole() -> None:
+    """A master by the clock, whose period goes well with the timer's."""
+    reads = turns(
+        (784, 3), (16, 5), (192, 3), (16, 5), (784, 8), (32, 2), (16, 5), (944, 8), (208, 8), (784, 8), (32, 7)
+    )
+    assert held_back(ReadTimes.of([(time + 7 * (time % 3), octets) for time, octets in reads]), LINE).period == 16 * MS
+
+
+def test_answers_a_period_behind_their_requests_are_no_cut_frames() -> None:
+    reads = turns((784, 8), (16, 8), (192, 8), (16, 7), (784, 8), (32, 7), (944, 8), (208, 8))
+    assert held_back(ReadTimes.of([(time + 7 * (time % 3), octets) for time, octets in reads]), LINE).latency == 0
