@@ -28,6 +28,7 @@ from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, ech
 from dissectors.modbus.exchanges import FIRST_SEEN
 from dissectors.modbus.functions import BROADCAST, ITEMS_ASKED
 from dissectors.modbus.pairing import another_function, is_listen_only, is_restart, mismatch
+from dissectors.modbus.promptness import AT_ONCE
 from dissectors.modbus.tracker_memory import TrackerMemory
 from dissectors.tracker import Placement, Tracked, Transaction, Verdict
 
@@ -272,7 +273,7 @@ class ModbusTracker(TrackerMemory):
         if last is not None and self._echoes.owes_answer(last, seen) and self._times.in_time(last, seen):
             return self._answer_behind_echo(last, seen)
         gap = 0 if self._last_end is None else max(0, seen.frame.start - self._last_end)
-        is_timed = self._timing.has_times  # else nothing comes too soon
+        is_timed = self._timing.has_times and self._timing.latency < AT_ONCE  # else nothing comes too soon
         too_soon = is_timed and gap < self.learnt.too_soon(self._silence) and not self._may_be_next(gap, seen)
         if last is not None and last.octets == seen.octets and too_soon:
             if last.answered and self._held.goes_on(seen):
