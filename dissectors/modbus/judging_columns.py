@@ -60,6 +60,8 @@ class _Judging:
         judge = self._judge
         if judge.open is not None or judge.broadcast is not None or judge.ends.newest is not None:
             return False
+        if judge.unfit is not None:
+            return False
         if max(len(judge.asked), len(judge.codes), len(judge.answers)) >= OPEN_KEPT - 1:
             return False
         return not judge.seen.pairs or not (self.found.became[begin:end] == UNANSWERED).any()

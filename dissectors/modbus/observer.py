@@ -18,7 +18,7 @@ from dissectors.modbus.functions import COPIED, EXCEPTION_BIT, FUNCTIONS
 from dissectors.modbus.learned_timing import READ
 from dissectors.modbus.limits import ILLEGAL, beyond_limits
 from dissectors.modbus.pairing import is_answer
-from dissectors.modbus.remembered import FINAL_KEPT, LOST_KEPT, OPEN_KEPT, SLOW_UNLEARNT, slow_limit
+from dissectors.modbus.remembered import FINAL_KEPT, LOST_KEPT, OPEN_KEPT, SLOW_UNLEARNT, Unfit, slow_limit
 from dissectors.modbus.response_groups import AnsweredRequest
 from dissectors.modbus.row_observer import AT_ONCE, STRAY_KEPT, RowObserver
 from dissectors.modbus.rules_bus import judge
@@ -28,7 +28,6 @@ from dissectors.tracker import Transaction, Verdict
 
 _NO_WAIT = 10 * MS  # no master gives up so soon: it does not wait for one answer before it asks for the next
 _EXCESS_KEPT = 256
-_WORDS_KEPT = 16
 _MAY_BE_TORN = (Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST, Verdict.NO_RESPONSE)
 _SETTLED_ELSEWHERE = (Verdict.ECHO, Verdict.DATA, Verdict.OPEN, Verdict.BROADCAST)
 
@@ -286,9 +285,12 @@ class ModbusFindings(RowObserver):
             if is_disturbed and self._answers_another(transaction, asked, answer):
                 self.seen.crossed.add(transaction.end, transaction.request, transaction.response)
                 return
-            station.unfit.add(transaction.end, transaction.request, transaction.response)
-            if len(station.unfit_words) < _WORDS_KEPT:
-                station.unfit_words[transaction.error] += 1
+            unfit = Unfit(station, transaction, answer)
+            if self.timing.latency < AT_ONCE or asked.header.role is Role.REQUEST:
+                unfit.count()
+            else:
+                self.unfit = unfit
+                self.settle_unfit(next(reversed(self.said), 0))
 
     def _settle_repeat(self, station: StationRecord, transaction: Transaction, asked: AskedRequest) -> None:
         """A request that was sent again. What was not held against the station is no try before it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
 
 from dissectors.frame import Flaw, Frame
 from dissectors.line import MS, Timing
@@ -16,6 +17,7 @@ from dissectors.modbus.learned_timing import LearnedTiming
 from dissectors.modbus.long_silences import LongSilences
 from dissectors.modbus.station_record import Lost, StationRecord
 from dissectors.modbus.torn import TornFrames
+from dissectors.tracker import Transaction
 
 SLOW_UNLEARNT = 500 * MS
 """An answer that takes longer is slow while the master's timeout is not known."""
@@ -27,6 +29,25 @@ LOST_KEPT = 64
 FINAL_KEPT = 64
 BEGIN = 5
 """Octets of a request that no noise makes by chance: unit, function, address, half a quantity."""
+
+
+_WORDS_KEPT = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Unfit:
+    """An answer that is not what was asked for. `octets`: of the answer."""
+
+    station: StationRecord
+    transaction: Transaction
+    octets: bytes
+
+    def count(self) -> None:
+        """Hold it against the station."""
+        one, station = self.transaction, self.station
+        station.unfit.add(one.end, one.request, one.response)
+        if one.error is not None and len(station.unfit_words) < _WORDS_KEPT:
+            station.unfit_words[one.error] += 1
 
 
 def slow_limit(timeout: int | None) -> int | None:
@@ -47,6 +68,8 @@ class Remembered:
         self.asked: dict[int, AskedRequest] = {}  # by transaction
         self.open: AskedRequest | None = None  # the newest request, while nothing has come after it
         self.broadcast: AskedRequest | None = None  # likewise
+        self.unfit: Unfit | None = None  # that may be the master's next request
+        self.said: dict[int, bytes] = {}  # the last requests by row, where times do not tell; the newest row is last
         self.given_back = CutEcho()  # behind the newest frame that may be a request
         self.codes: dict[int, int] = {}  # exception codes by transaction
         self.answers: dict[int, bytes] = {}  # good answers by transaction
@@ -71,6 +94,14 @@ class Remembered:
         self.waited_for: deque[int] = deque(maxlen=LOST_KEPT)  # those for which it waited longer than that
         self.hasty: deque[int] = deque(maxlen=LOST_KEPT)  # those after which another came sooner than that
         self.final: dict[int, bytes] = {}  # the last answers, by transaction
+
+    def settle_unfit(self, newest: int) -> None:
+        """Count the last unfit answer once the row behind it is known, unless that is a request that says the same:
+        where times do not tell, it was that request, and the one that it seemed to answer an answer behind an echo."""
+        if self.unfit is not None and newest > (row := self.unfit.transaction.response or 0):
+            if self.said.get(row + 1) != self.unfit.octets:
+                self.unfit.count()
+            self.unfit = None
 
     def station(self, unit: int) -> StationRecord:
         """What is known of a station."""

@@ -40,6 +40,8 @@ class RowObserver(Remembered):
         seen.now = max(seen.now, event.end)
         if self._is_cut_echo(no, event):
             return
+        if self.timing.latency >= AT_ONCE:
+            self._note_said(no, event, header, placement)
         is_behind_silence = gap >= SILENCE_LEAST and self.silences.is_one(gap)
         if is_behind_silence:
             self._see_silence(gap, placement)
@@ -71,6 +73,14 @@ class RowObserver(Remembered):
             self._see_request(AskedRequest(no, event, header, octets, is_behind_silence), placement)
         if header.ok and octets and octets[0] > LAST_STANDARD_UNIT:
             self.station(octets[0]).reserved.add(event.start, no)
+
+    def _note_said(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
+        """Where times do not tell: what a request says; an answer that seemed unfit may have been the same request."""
+        is_request = placement is not None and placement.role is not Role.RESPONSE and header is not None and header.ok
+        self.said[no] = readable_adu(event) if is_request and isinstance(event, Frame) else b""
+        if len(self.said) > OPEN_KEPT:
+            del self.said[next(iter(self.said))]
+        self.settle_unfit(no)
 
     def _see_silence(self, gap: int, placement: Placement | None) -> None:
         """A long silence before a row: what was given up in it as not answered may have been."""
