@@ -13,6 +13,8 @@ from __future__ import annotations
 
 from ipaddress import IPv4Address, IPv4Network
 
+from dissectors.bacnet.npdu import GLOBAL_BROADCAST
+
 BACNET_PORTS = range(0xBAC0, 0xBAD0)
 PRIVATE = tuple(map(IPv4Network, ("10.0.0.0/8", "172.16.0.0/12", "192.168.0.0/16", "169.254.0.0/16")))
 """RFC 1918 and 3927."""
@@ -30,5 +32,7 @@ def mac_text(address: bytes) -> str:
 
 
 def remote(net: int, address: bytes | None) -> str:
-    """A station, or without an address everybody, on another network: "network 13:16", "network 13"."""
+    """A station, or without an address everybody, on another network: "network 13:16", "network 13", "all networks"."""
+    if net == GLOBAL_BROADCAST:
+        return "all networks"
     return f"network {net}" + (f":{mac_text(address)}" if address else "")

@@ -70,7 +70,7 @@ def _detail(frame: Frame, message: Message) -> str:
         return _plain_data(message)
     parts = []
     if npdu.dnet is not None:
-        parts.append("to " + ("all networks" if npdu.dnet == npdus.GLOBAL_BROADCAST else remote(npdu.dnet, npdu.dadr)))
+        parts.append("to " + remote(npdu.dnet, npdu.dadr))
     if npdu.snet is not None:
         parts.append("from " + remote(npdu.snet, npdu.sadr))
     if npdu.message is not None:
