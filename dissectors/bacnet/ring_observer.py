@@ -216,7 +216,7 @@ class MstpRingObserver(TokenWatch):
         if frame_type not in CARRIES_NPDU or frame_type in EXPECTING:
             return False
         asked = self._questions.asked
-        if self._before is None or (source, destination) in self._questions.postponed:
+        if self._before is None or self._questions.owes(source, destination):
             return False
         if asked is not None and asked.destination == source:
             return False

@@ -90,6 +90,10 @@ class RingQuestions:
         """Whether it is the turn of `source`, which was asked."""
         return self.asked is not None and self.asked.destination == source
 
+    def owes(self, server: int, client: int) -> bool:
+        """Whether a station may still answer what it was asked: it postponed its answer, or has given none."""
+        return (server, client) in self._unanswered or (server, client) in self.postponed
+
     def is_searching(self, frame: Frame) -> bool:
         """Whether a frame goes on with the search of the newest poll, to the next address: no station that has lost the
         token begins there."""

@@ -430,3 +430,14 @@ def test_a_millisecond_over_the_limit_says_nothing_of_an_adapter_that_nobody_nam
     assert not {code for code, _ in script(steps, timing=unnamed).graves()}
     slow = [step if at % 8 else (21.0, step[1]) for at, step in enumerate(steps)]
     assert ("MS103", "MAC 3") in script(slow, timing=unnamed).graves()
+
+
+def test_a_late_answer_with_the_same_id_is_the_station_s_own():
+    """A client that gives all its requests one id: 19 was asked before, and is late."""
+    steps: list[Step] = []
+    for _ in range(6):
+        steps += [*rounds(4, 3, 12, 19), (2, data(3, 19, READ, expects=True)), (262, token(3, 12)), (2, token(12, 19))]
+        steps += [(2, token(19, 3)), (2, data(3, 12, READ, expects=True)), (6, data(12, 3, VALUE))]
+        steps += [(4, data(19, 3, VALUE)), (3, token(3, 12)), (2, token(12, 19)), (2, token(19, 3))]
+    read = script(steps)
+    assert read.graves() == {("MS302", "3 → 19")}
