@@ -36,11 +36,10 @@ _ALL = (
         "MS103",
         Severity.WARNING,
         "slow to use the token",
-        "A station began to send later than 15 ms (Tusage_delay) after the token reached it, by the smallest "
-        "reading of the "
-        "time (3 ms later, where nobody says what the adapter is) and more often than the others, requests only where "
-        "they are one in ten: a read that came late does not show there; or only when its neighbour had already repeated the token or taken it "
-        "back, which makes two tokens for a moment.",
+        "A station began to send later than 15 ms (Tusage_delay) after the token reached it, by the smallest reading "
+        "of the time (3 ms later, where nobody says what the adapter is) and more often than the others, requests only "
+        "where they are one in ten: a read that came late does not show there; or only when its neighbour had already "
+        "repeated the token or taken it back, which makes two tokens for a moment.",
         "an overloaded or old station; each round takes longer, and above 20 ms its neighbour repeats the token",
         "firmware and load of the station; Max_Info_Frames of the others",
         explains=("MS102", "MS104", "MS105", "MS106", "MS401", "MS403", "LN101", "LN103", "LN2"),
