@@ -75,7 +75,7 @@ def _of_bus(seen: BusRecord, is_blamed: bool, scanned: list[int], unheard: list[
     }
     yield from of_unheard(seen, unheard)
     waited = sum(station.waited for station in absent.values())
-    if waited:
+    if waited and seen.timing.has_times:
         share = waited / seen.span
         words = f"{share:.0%} of the time ({duration(waited)}) went into waiting for {units(absent)}"
         severity = Severity.WARNING if share > _WASTE else None

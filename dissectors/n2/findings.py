@@ -60,7 +60,7 @@ class N2Findings:
         self.master = Damages()
         self._asked: dict[int, OpenCommand] = {}  # by transaction
         self.masters = Masters()
-        self.patience = Patience()
+        self.patience = Patience(has_times=timing.has_times)
         self.clocked = Clocked()
         self.torn = TornFrames(timing)
         self.strikes = Strikes()

@@ -1,7 +1,8 @@
 """Answers that the master had and this tap did not hear: the master goes on as after one.
 
 No NAE gives up before 250 ms, and each repeats then. So who asks something else sooner, after one try, and far sooner
-than it repeats, had an answer. A tool that looks who is there is impatient, and asks nothing but that.
+than it repeats, had an answer. A tool that looks who is there is impatient, and asks nothing but that. A log without
+times does not tell how soon the next command came.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ class Patience:
     """How long the master waits for an answer, as far as its repeats tell: `shortest`, ns."""
 
     shortest: int = SOON
+    has_times: bool = True
 
     def is_unheard(self, waited: int, is_again: bool, attempt: int, kind: str) -> bool:
         """Whether the next command, `waited` ns behind an unanswered one, shows that it was answered.
@@ -33,7 +35,7 @@ class Patience:
             if waited >= HASTE:  # else it was given again, or asked twice
                 self.shortest = min(self.shortest, waited)
             return False
-        return attempt == 1 and kind != ONLY_LOOKS and 4 * waited < 3 * self.shortest
+        return self.has_times and attempt == 1 and kind != ONLY_LOOKS and 4 * waited < 3 * self.shortest
 
     def tells(self, asked: OpenCommand, attempt: int, then: OpenCommand | None) -> bool:
         """The same of frames; `then`: the newest command behind the unanswered one."""
