@@ -90,6 +90,8 @@ class ModbusFindings(RowObserver):
         station = self.station(transaction.station)
         if verdict is Verdict.UNDECIDED:
             station.undecided.add(transaction.start, transaction.request, transaction.response)
+            if (lost := self.lost.pop(transaction.of or 0, None)) is not None:
+                station.forgive(lost)  # perhaps this is its answer
             return
         if transaction.attempt > 1:
             self.repeats.append(transaction.id)

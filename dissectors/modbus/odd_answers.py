@@ -70,6 +70,13 @@ class OddAnswers:
         self._held.crossed = request
         return late
 
+    def is_perhaps_slow(self, request: Exchange, seen: Seen) -> bool:
+        """Whether a frame that nothing waits for any more may be the answer to the last request, of a maker's function:
+        directly behind it, and no repeat, which would be as long."""
+        if request.answered or not (has_no_layout(seen) and request.is_for(seen.octets)):
+            return False
+        return len(seen.octets) != len(request.octets) and self._held.late_for(seen) is request
+
     def learn(self, between: Exchange, answered: Exchange) -> Exchange | None:
         """A request was answered after all when another one had come, into the wait for it: the one given up that the
         other answers; None where it is none's answer, or is that request again."""

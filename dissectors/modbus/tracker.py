@@ -272,6 +272,8 @@ class ModbusTracker(TrackerMemory):
         last = self._held.last
         if last is not None and self._echoes.owes_answer(last, seen) and self._times.in_time(last, seen):
             return self._answer_behind_echo(last, seen)
+        if last is not None and self._last_end == last.end and self._odd.is_perhaps_slow(last, seen):
+            return self._answer_apart(seen, Verdict.UNDECIDED, last)
         gap = 0 if self._last_end is None else max(0, seen.frame.start - self._last_end)
         is_timed = self._timing.has_times and self._timing.latency < AT_ONCE  # else nothing comes too soon
         too_soon = is_timed and gap < self.learnt.too_soon(self._silence) and not self._may_be_next(gap, seen)

@@ -186,3 +186,18 @@ def test_the_first_frame_of_a_capture_may_be_a_write_that_is_confirmed_late(bus)
         bus.say("0306000500ff", 900).say(OTHER, 1000).say("0306000500ff", 10)
         bus.say(f"020302{number:04x}", 20)
     assert graves_of(bus) == {("MB103", "station 3")}
+
+
+def test_a_makers_answer_after_all_waiting_is_over_leaves_open_what_it_is(bus):
+    for value in range(4):
+        bus.exchange("020300000002", "020304000700ff").say(f"01410603450{value:x}", 150)
+        bus.say(f"01410613450{value:x}4a564a56", 6000)
+    assert {code for code, _ in graves_of(bus)} == set()
+    assert "MB403" in {one.code for one in findings_of(bus)}
+
+
+def test_a_makers_request_every_few_seconds_that_nobody_answers_stays_unanswered(bus):
+    for value in range(6):
+        bus.say(f"01410603450{value % 2:x}", 6000)
+    bus.exchange("020300000002", "020304000700ff")
+    assert graves_of(bus) == {("MB001", "station 1")}
