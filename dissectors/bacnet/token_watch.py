@@ -309,7 +309,10 @@ class TokenWatch:
         return 0 if self._before is None else max(0, frame.start - self._before.end)
 
     def _silence(self, event: Event) -> int:
-        return 0 if self._quiet_since is None else max(0, event.start - self._quiet_since)
+        """Before an event, ns; 0 where nobody knows when anything came: there it is only where octets were laid."""
+        if self._quiet_since is None or not self._tally.timing.has_times:
+            return 0
+        return max(0, event.start - self._quiet_since)
 
     def _forget(self) -> None:
         self._questions.asked = None

@@ -92,6 +92,16 @@ def test_a_ring_without_times_has_no_rounds(tmp_path: Path, capsys: pytest.Captu
     assert all(line.split()[5:13] == ["–"] * 8 for line in said.splitlines()[1:4])
 
 
+def test_a_ring_without_times_was_never_silent(tmp_path: Path) -> None:
+    """Blocks of a log lie far apart where its line is faster than what its octets were laid at."""
+    path = tmp_path / "x.log"
+    round_ = [frame(0, following, mac) for mac, following in ((1, 3), (3, 7), (7, 1))]
+    path.write_text("".join(f"{one.hex(' ')}\n" for one in round_ * 1000))
+    log = read(path)
+    session = with_settings(log.session, "mstp", LineSettings.parse("115200,8N1"))
+    assert "MS101" not in {one.code for one in findings_of(session, log.items())}
+
+
 def test_nothing_comes_too_soon_where_nobody_knows_when_it_came(tmp_path: Path) -> None:
     """At 1200 Bd lines of a log lie closer together than a station may answer."""
     asked, answered = seal_rtu(b"\1\x64\1\2"), seal_rtu(b"\1\x64\t\t\t\t\t")
