@@ -93,7 +93,6 @@ class BusWatch:
         self.slaves: dict[int, SlaveView] = {}
         self._masters: dict[int, _Master] = {}
         self._tell = tell
-        self._has_times = timing.has_times
         self._first: int | None = None
         self._last = 0
         self._wasted = 0
@@ -169,7 +168,7 @@ class BusWatch:
             for address, view in self.slaves.items()
             if view.state is not None
         }
-        return Ring(masters, slaves, self._first or 0, self._last, self._wasted, self._has_times)
+        return Ring(masters, slaves, self._first or 0, self._last, self._wasted, self._timing.has_times)
 
     def window(self) -> RingWindow:
         """What is new since this was called the last time; the first time is not told of."""

@@ -7,15 +7,10 @@ from random import Random
 
 import pytest
 
-from dissectors.findings import Severity
 from dissectors.frame import Chunk
-from dissectors.line import MS, LineSettings, Timing
-from dissectors.n2 import N2
+from dissectors.line import MS
 from dissectors.n2.envelope import make_answer, make_command
-from dissectors.n2.findings import N2Findings
-from sniff.engine.engine import Engine, Output
-
-LINE = LineSettings.parse("9600,8N1")
+from tests.dissectors.n2.heard import BEGIN, LINE, warned_of
 
 Next = Callable[[int, int], int]
 """When the next command begins: by the begin of the one before and the end of its answer, ns."""
@@ -23,25 +18,17 @@ Next = Callable[[int, int], int]
 
 def told(follows: Next, silent: int, spread: int = 20) -> set[tuple[str, str]]:
     """Warnings about three stations that answer after 10 ms or some more; `silent`: whose answers are not heard."""
-    judge, engine, dice, begin = N2Findings(Timing(LINE)), Engine(N2, Timing(LINE)), Random(5), 10**12
-
-    def take(output: Output) -> None:
-        for row in output.rows:
-            judge.see(row.no, row.event, row.header, row.placement)
-        for transaction in output.transactions:
-            judge.settle(transaction)
-
+    dice, begin, chunks = Random(5), BEGIN, list[Chunk]()
     for turn in range(120):
         station = 1 + turn % 3
         command, answer = make_command(f"{station:02X}110103"), make_answer("0041A00000")
         end = begin + len(command) * LINE.char
-        take(engine.feed(Chunk(end, command)))
+        chunks.append(Chunk(end, command))
         answer_end = end + (10 + dice.randrange(spread)) * MS + len(answer) * LINE.char
         if station != silent:
-            take(engine.feed(Chunk(answer_end, answer)))
+            chunks.append(Chunk(answer_end, answer))
         begin = follows(begin, answer_end)
-    take(engine.close())
-    return {(one.code, one.subject) for one in judge.findings() if one.severity >= Severity.WARNING}
+    return warned_of(chunks)
 
 
 @pytest.mark.parametrize("step", [120, 160])

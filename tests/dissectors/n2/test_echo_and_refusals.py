@@ -2,33 +2,13 @@
 
 from __future__ import annotations
 
-from dissectors.findings import Severity
-from dissectors.frame import Chunk
-from dissectors.line import MS, LineSettings, Timing
-from dissectors.n2 import N2
 from dissectors.n2.envelope import make_answer, make_command
-from dissectors.n2.findings import N2Findings
-from sniff.engine.engine import Engine, Output
-
-LINE = LineSettings.parse("9600,8N1")
+from tests.dissectors.n2.heard import in_turns, warned_of
 
 
 def told(turns: list[list[bytes]], wait: int = 270, pause: int = 12) -> set[tuple[str, str]]:
     """What is said as a warning at least of turns, `wait` ms apart: a command, and what follows it after `pause` ms."""
-    judge, engine, now = N2Findings(Timing(LINE)), Engine(N2, Timing(LINE)), 10**12
-
-    def take(output: Output) -> None:
-        for row in output.rows:
-            judge.see(row.no, row.event, row.header, row.placement)
-        for transaction in output.transactions:
-            judge.settle(transaction)
-
-    for turn in turns:
-        for at, octets in enumerate(turn):
-            now += (pause if at else wait) * MS + len(octets) * LINE.char
-            take(engine.feed(Chunk(now, octets)))
-    take(engine.close())
-    return {(one.code, one.subject) for one in judge.findings() if one.severity >= Severity.WARNING}
+    return warned_of(in_turns(turns, wait, pause))
 
 
 def asked(station: int) -> list[bytes]:

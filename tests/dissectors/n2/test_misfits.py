@@ -5,37 +5,20 @@ from __future__ import annotations
 import pytest
 
 from dissectors.findings import Severity
-from dissectors.frame import Chunk
-from dissectors.line import MS, LineSettings, Timing
-from dissectors.n2 import N2
 from dissectors.n2.envelope import make_answer, make_command
-from dissectors.n2.findings import N2Findings
-from sniff.engine.engine import Engine, Output
+from tests.dissectors.n2.heard import findings_of, in_turns
 
-LINE = LineSettings.parse("9600,8N1")
 VALUE, LONG, SHORT, NOTHING = make_answer("41A00000"), make_answer("0041A00000"), make_answer("41A0"), b"A\r"
 
 
 def told(answers: list[bytes], attribute: str = "03", before: bytes = VALUE, wait: int = 60) -> list[tuple[str, str]]:
     """Severity and words of N2016 at station 2, which gives these answers in turn; station 1 is asked before it."""
-    judge, engine, now = N2Findings(Timing(LINE)), Engine(N2, Timing(LINE)), 10**12
-
-    def take(output: Output) -> None:
-        for row in output.rows:
-            judge.see(row.no, row.event, row.header, row.placement)
-        for transaction in output.transactions:
-            judge.settle(transaction)
-
-    for turn in range(40):
-        for station, answer in ((1, before), (2, answers[turn % len(answers)])):
-            command = make_command(f"{station:02X}1105{attribute if station == 2 else '03'}")
-            now += wait * MS + len(command) * LINE.char
-            take(engine.feed(Chunk(now, command)))
-            now += 12 * MS + len(answer) * LINE.char
-            if answer:
-                take(engine.feed(Chunk(now, answer)))
-    take(engine.close())
-    found = [one for one in judge.findings() if one.code == "N2016"]
+    turns = (
+        (make_command(f"{station:02X}1105{attribute if station == 2 else '03'}"), *([answer] if answer else []))
+        for turn in range(40)
+        for station, answer in ((1, before), (2, answers[turn % len(answers)]))
+    )
+    found = [one for one in findings_of(in_turns(turns, wait)) if one.code == "N2016"]
     assert {one.subject for one in found} <= {"station 2"}
     return [(one.severity.name, one.seen) for one in found if one.severity >= Severity.NOTE]
 
