@@ -111,7 +111,8 @@ def run(args: argparse.Namespace) -> int:
             session = arguments.settings_of(args, capture.session, name)
             for samples in _chosen(args, capture, session):
                 for sample in samples.in_order():
-                    table.add([*first, *(sample_row(sample) if session.has_times else [None, *sample_row(sample)[1:]])])
+                    time, *rest = sample_row(sample)
+                    table.add([*first, time if session.has_times else None, *rest])
             say_incomplete(name, capture)
     return 0
 
@@ -131,10 +132,10 @@ def _print(args: argparse.Namespace) -> int:
         else:
             cells = (cells for samples in _chosen(args, capture, session) for cells in _cells(samples))
         if not session.has_times:
-            cells = [
+            cells = (
                 tuple(None if name in OF_TIME else cell for name, cell in zip(headings, row, strict=True))
                 for row in cells
-            ]
+            )
         if growing is not None:
             growing.add((path, *row) for row in cells) if first else growing.add(cells)
         elif latest:

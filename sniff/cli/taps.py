@@ -43,6 +43,8 @@ def run(args: argparse.Namespace) -> int:
     for path, capture in taps:
         session = arguments.settings_of(args, capture.session, path)
         spoken.append(session.protocol)
+        if not session.has_times:
+            raise Failure(f"{path}: does not say when anything came; taps are compared by times", USAGE)
         ear = TapEar()
         survey(Watched(capture), session, ear, reference=args.reference)
         heard.append(ear.frames())

@@ -47,6 +47,18 @@ def test_frames_as_json_and_csv_have_no_instants(log: Path, sniff485: Run) -> No
         assert {(row["t"], row["start_ns"], row["end_ns"]) for row in table} == {("",) * 3}
 
 
+def test_fields_of_time_are_empty(log: Path, sniff485: Run) -> None:
+    names = ("t", "start_ns", "frame.time", "frame.time_relative", "frame.time_delta")
+    out = sniff485("show", log, "-T", "fields", "-e", "no", *(word for name in names for word in ("-e", name))).out
+    assert [line.split("\t") for line in out.splitlines()] == [[str(no), "", "", "", "", ""] for no in range(1, 17)]
+
+
+def test_two_taps_are_not_compared(log: Path, sniff485: Run) -> None:
+    ran = sniff485("taps", log, log)
+    assert (ran.code, ran.out) == (2, "")
+    assert "does not say when anything came" in ran.err
+
+
 def test_findings_have_no_instants(log: Path, sniff485: Run) -> None:
     found = [json.loads(line) for line in sniff485("check", "--json", log).out.splitlines()]
     assert found
