@@ -160,7 +160,7 @@ def measure(path: Path, size: tuple[int, int], last: int) -> dict[str, tuple[flo
         took["jump"] = screen.pressed("\r", rf">\s+{last // 2}\s")
         for text in FILTERS:
             screen.asked("/", "valid|empty", text)
-            took[text] = screen.pressed("\r", r"of \d+ frames · esc")
+            took[text] = screen.pressed("\r", r"of \d+ rows · esc")
             screen.keys("\x1b")
             screen.drain(1.0)
         took["megabytes; all threads computed"] = screen.memory() / 1e6, screen.cpu()
