@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from math import sqrt
 
 from dissectors.bacnet.findings_of_use import has_two_rhythms
 from dissectors.bacnet.ring import Happened, Ring, RingEventKind, RingNode
-from dissectors.bacnet.ring_remarks import Remark, listed, of, plain
+from dissectors.bacnet.ring_remarks import Remark, listed, of, plain, subject
+from dissectors.bacnet.rules import RULES
 from dissectors.chances import is_rare
 from dissectors.findings import Severity, counted, times
+from dissectors.wrong_checks import Habit
 
 DAMAGED_LEAST = 3
 DAMAGED_SHARE = 0.001
@@ -64,6 +67,15 @@ def _is_its_own(ring: Ring, node: RingNode) -> bool:
 def _of_one(ring: Ring, mac: int, node: RingNode) -> Iterable[Remark]:
     sent = _sent(node)
     replies = ring.of(RingEventKind.DAMAGED_REPLY, mac).count
+    for what, habit in (
+        ("data CRC", node.data_checks.habit(node.damaged, node.data_sent) or node.data_checks.same(node.damaged)),
+        (
+            "header CRC",
+            node.header_checks.habit(node.damaged, sent - node.damaged) or node.header_checks.same(node.damaged),
+        ),
+    ):
+        if habit is not None:
+            yield _wrongly_checked(mac, habit, f"{habit.count} of its {sent} frames right but for the {what}")
     if node.cut_last >= DAMAGED_LEAST and node.cut_last >= AT_END_SHARE * node.damaged:
         seen = (
             f"{node.cut_last} of its {sent} frames lack their last octet or two, or it is wrong; all before that fits"
@@ -74,6 +86,11 @@ def _of_one(ring: Ring, mac: int, node: RingNode) -> Iterable[Remark]:
         if replies:
             seen += f", {replies} of them answers"
         yield plain("MS402", ring, mac, seen, node.damaged)
+
+
+def _wrongly_checked(mac: int, habit: Habit, seen: str) -> Remark:
+    finding = habit.tally.found(RULES["MS407"], subject(mac), f"{seen}, {habit.mistake.words}")
+    return Remark(mac, replace(finding, means=habit.mistake.means or finding.means))
 
 
 def _sent(node: RingNode) -> int:

@@ -16,6 +16,7 @@ from typing import Any
 from dissectors.bacnet.limits import MAX_MASTER, T_REPLY_DELAY, T_USAGE_DELAY, TURNAROUND_BITS
 from dissectors.histogram import Histogram
 from dissectors.line import Timing
+from dissectors.wrong_checks import WrongChecks
 
 EVENTS_MAX = 32
 IMPOSSIBLE_SHARE = 0.01
@@ -110,7 +111,8 @@ class RingNode:
     successor, its first one or one that was lost, and shortly after: they are as they should be. `polls_waited`:
     unanswered polls after which it waited as long as it must. `damaged`: damaged frames that it sent, by their header
     or by whose turn it was; `damaged_octets` of them; `cut_last`: those where the last octet, or two, alone is missing
-    or wrong. `last_token`, `last_polled`: ns, when it was sent a token or a poll last.
+    or wrong; `data_checks`, `header_checks`: how their checks are wrong. `last_token`, `last_polled`: ns, when it was
+    sent a token or a poll last.
     """
 
     tokens_received: int = 0
@@ -145,6 +147,8 @@ class RingNode:
     poll_wait: Histogram = field(default_factory=Histogram)
     holds: Mapping[int, int] = field(default_factory=lambda: MappingProxyType({}))
     devices: tuple[int, ...] = ()
+    data_checks: WrongChecks = field(default_factory=WrongChecks)
+    header_checks: WrongChecks = field(default_factory=WrongChecks)
 
     @property
     def is_master(self) -> bool:
@@ -172,6 +176,8 @@ class RingNode:
             last_polled=max(self.last_polled, other.last_polled),
             holds=MappingProxyType(holds),
             devices=tuple(dict.fromkeys(self.devices + other.devices))[:EVENTS_MAX],
+            data_checks=self.data_checks.merge(other.data_checks),
+            header_checks=self.header_checks.merge(other.header_checks),
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dissectors.bacnet.check_mistakes import data_ways, header_ways
 from dissectors.bacnet.frame_types import HEADER, PREAMBLE, data_length, is_encoded, total
 from dissectors.bacnet.header import is_whole_header
 from dissectors.bacnet.mending import WITHOUT_DATA
@@ -27,8 +28,8 @@ def speaker_of(frame: Frame, header: Header, turn: Turn) -> Speaker | None:
     return speaker
 
 
-def count_damage(tally: RingTally, frame: Frame, speaker: Speaker | None) -> None:
-    """Count a damaged frame, with its sender where there is one."""
+def count_damage(tally: RingTally, no: int, frame: Frame, speaker: Speaker | None) -> None:
+    """Count a damaged frame, in that row, with its sender where there is one."""
     if frame.damage is Damage.HEADER:
         tally.header_errors += 1
     elif frame.damage is Damage.CHECK:
@@ -44,6 +45,8 @@ def count_damage(tally: RingTally, frame: Frame, speaker: Speaker | None) -> Non
     node.damaged += 1
     node.damaged_octets += len(frame.octets)
     node.cut_last += only_its_end(frame, speaker)
+    node.data_checks.see(no, frame.end, data_ways(frame))
+    node.header_checks.see(no, frame.end, header_ways(frame))
 
 
 def only_its_end(frame: Frame, speaker: Speaker) -> bool:

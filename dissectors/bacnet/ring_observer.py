@@ -135,7 +135,7 @@ class MstpRingObserver(TokenWatch):
         tally, asked = self._tally, self._questions.asked
         self._broke_off = not self._doubt and breaks_off(frame, self._holder)
         speaker = speaker_of(frame, header, self._turn)
-        count_damage(tally, frame, None if self._disturb(no, frame.start) else speaker)
+        count_damage(tally, no, frame, None if self._disturb(no, frame.start) else speaker)
         self._questions.asked = None
         if asked is None or speaker is None or asked.frame_type == _POLL:
             pass

@@ -9,6 +9,7 @@ from dissectors.bacnet.ring import SUMS, Edge, Happened, Ring, RingEvent, RingEv
 from dissectors.bacnet.ring_window import Happening, RingJournal
 from dissectors.histogram import Histogram
 from dissectors.line import Timing
+from dissectors.wrong_checks import WrongChecks
 
 
 @dataclass(slots=True)
@@ -48,6 +49,8 @@ class NodeTally:
     poll_wait: Histogram = field(default_factory=Histogram)
     holds: dict[int, int] = field(default_factory=dict)
     devices: list[int] = field(default_factory=list)
+    data_checks: WrongChecks = field(default_factory=WrongChecks)
+    header_checks: WrongChecks = field(default_factory=WrongChecks)
     gone: bool = False  # it was passed over
     searches: bool = False  # its successor is lost, and it has passed the token to nobody since
     searching_since: int | None = None  # since when, after a loss
@@ -72,6 +75,8 @@ class NodeTally:
             poll_wait=self.poll_wait.copy(),
             holds=MappingProxyType(dict(self.holds)),
             devices=tuple(self.devices),
+            data_checks=self.data_checks.copy(),
+            header_checks=self.header_checks.copy(),
         )
 
 

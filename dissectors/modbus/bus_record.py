@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from dissectors.chances import is_rare
 from dissectors.findings import Tally
@@ -14,6 +15,10 @@ from dissectors.line import MS, Timing
 from dissectors.modbus.station_record import Cycles, StationRecord
 from dissectors.rhythm import Rhythm
 from dissectors.strikes import Strikes
+from dissectors.wrong_checks import Habit, WrongChecks
+
+if TYPE_CHECKING:
+    from dissectors.modbus.odd_ends import OddEnd
 
 _SENDERS_KEPT = 300
 _SCAN_LEAST = 4
@@ -63,8 +68,8 @@ class BusRecord:
 
     `hasty`: requests after another that nothing had followed: (longest reading of the silence between, unit asked
     before, time, frame before, frame). `broken_in`: the same of
-    damaged frames that begin as a request to another station. `close`, `paused`, `bare_ends`: by sender; of the first,
-    (time, frame before, frame). `bare_ends`: ASCII frames without their LF.
+    damaged frames that begin as a request to another station. `close`, `paused`: by sender; of the first,
+    (time, frame before, frame). `odd_ends`: ASCII frames that do not end with CR LF, by how they end and by sender.
     `held_back`: of the paused frames, those that an adapter may have made so that nobody named.
     `damaged_here`: damaged requests that were answered all the same.
     `again`: requests that were answered when they came a second time.
@@ -102,7 +107,7 @@ class BusRecord:
     close: dict[str, list[tuple[int, int, int]]] = field(default_factory=dict)
     paused: dict[str, Tally] = field(default_factory=dict)
     held_back: Counter[str] = field(default_factory=Counter)
-    bare_ends: dict[str, Tally] = field(default_factory=dict)
+    odd_ends: dict[tuple[OddEnd, str], Tally] = field(default_factory=dict)
     pairs: dict[tuple[int, int], Tally] = field(default_factory=dict)
     repeated_elsewhere: Counter[int] = field(default_factory=Counter)
     malformed: Tally = field(default_factory=Tally)
@@ -113,6 +118,7 @@ class BusRecord:
     for_nobody: Counter[int] = field(default_factory=Counter)
     cut_echoes: Tally = field(default_factory=Tally)
     requests_damaged_by: dict[Flaw, Tally] = field(default_factory=dict)
+    checks_of_requests: WrongChecks = field(default_factory=WrongChecks)  # of the damaged ones
     octets: Counter[str] = field(default_factory=Counter)
     frames: Counter[str] = field(default_factory=Counter)
     late_frames: set[int] = field(default_factory=set)
@@ -208,6 +214,16 @@ class BusRecord:
     def pair(self, pair: tuple[int, int]) -> Tally:
         """The record of one unit that answers for another."""
         return self.pairs.setdefault(pair, Tally()) if len(self.pairs) < _SENDERS_KEPT else self.unasked
+
+    def ended_oddly(self, sender: str) -> int:
+        """Frames of a sender that are damaged by their end alone."""
+        return sum(tally.count for (end, who), tally in self.odd_ends.items() if who == sender and end.is_damage)
+
+    @property
+    def miscounted_requests(self) -> Habit | None:
+        """What the damaged requests have in common that are right but for the check."""
+        damaged = self.damaged_requests.count
+        return self.checks_of_requests.habit(damaged, self.requests - damaged)
 
     def gap_tally(self, by_sender: dict[str, Tally], sender: str) -> Tally:
         """The record of one sender's gaps."""

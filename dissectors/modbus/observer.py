@@ -12,7 +12,8 @@ from dissectors.findings import ExceptionWords, Finding, Tally
 from dissectors.frame import Damage, Flaw, Frame, Role
 from dissectors.line import MS
 from dissectors.modbus.asked import AskedRequest
-from dissectors.modbus.envelope import RTU_NAME, rtu_check
+from dissectors.modbus.check_mistakes import ways
+from dissectors.modbus.envelope import RTU_NAME
 from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.functions import COPIED, EXCEPTION_BIT, FUNCTIONS
 from dissectors.modbus.learned_timing import READ
@@ -75,6 +76,8 @@ class ModbusFindings(RowObserver):
             self.seen.strikes.struck("master")
             self.seen.late_speakers.damaged_request(octets, transaction.start, transaction.request)
             self.seen.damaged_requests.add(transaction.start, transaction.request)
+            if asked is not None:
+                self.seen.checks_of_requests.see(asked.no, asked.frame.end, ways(asked.frame))
             if flaw is not None:
                 tallies = self.seen.requests_damaged_by
                 tallies.setdefault(flaw, Tally()).add(transaction.start, transaction.request)
@@ -167,9 +170,7 @@ class ModbusFindings(RowObserver):
         """How a damaged answer of a station, in that row, ended."""
         station = self.station(unit)
         station.cut += frame.damage is Damage.SHORT
-        check = rtu_check(frame) if frame.protocol == RTU_NAME and frame.damage is Damage.CHECK else None
-        if check is not None and not frame.marks:
-            station.wrong_check(check[0] ^ check[1], len(frame.octets)).add(frame.end, no, check[1])
+        station.checks.see(no, frame.end, ways(frame))
         if ends_badly(frame):
             station.last_octet.add(frame.end, no)
 

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from dissectors.frame import Flaw, Frame
 from dissectors.line import MS, Timing
 from dissectors.modbus.asked import AskedRequest
-from dissectors.modbus.bare_ends import BareEnds
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.cut_echo import CutEcho
 from dissectors.modbus.gaps import Gaps
 from dissectors.modbus.late_rows import LateRows
 from dissectors.modbus.learned_timing import LearnedTiming
 from dissectors.modbus.long_silences import LongSilences
+from dissectors.modbus.odd_ends import OddEnds
 from dissectors.modbus.station_record import Lost, StationRecord
 from dissectors.modbus.torn import TornFrames
 from dissectors.tracker import Transaction
@@ -63,7 +63,7 @@ class Remembered:
         self.learnt = LearnedTiming(timing)
         self.seen = BusRecord(timing)
         self.gaps = Gaps(timing, self.seen, self.learnt)
-        self.ends = BareEnds(timing, self.seen)
+        self.ends = OddEnds(timing, self.seen)
         self.silences = LongSilences(self.learnt)
         self.asked: dict[int, AskedRequest] = {}  # by transaction
         self.open: AskedRequest | None = None  # the newest request, while nothing has come after it

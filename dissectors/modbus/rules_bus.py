@@ -11,8 +11,9 @@ from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.damage_shares import DamageShare, shares_of_damage, to_blame
 from dissectors.modbus.finding_words import note_if, request_words, units
+from dissectors.modbus.odd_ends import OddEnd
 from dissectors.modbus.rules import RULES
-from dissectors.modbus.rules_station import FLAWS, is_absent, of_missing, of_station
+from dissectors.modbus.rules_station import FLAWS, is_absent, of_missing, of_station, wrongly_checked
 from dissectors.modbus.rules_unheard import of_unheard
 from dissectors.words import duration, fine_milliseconds
 
@@ -21,7 +22,7 @@ _HABIT = 10  # a sender that is too quick is so once in so many frames at least;
 _HABIT_LEAST = 6
 _PAUSES_LEAST = 3
 _CLOSE_LEAST = 3
-_BARE_LEAST = 3
+_ODD_LEAST = 3
 _MASTERS_LEAST = 3
 _CUT_LEAST = 3
 _COMMON_LEAST = 3
@@ -193,6 +194,10 @@ def _of_requests(seen: BusRecord) -> Iterator[Finding]:
             if tally.count == seen.requests:
                 words, severity = f"{words}, every time", Severity.ERROR  # no station can answer
             yield tally.found(RULES[FLAWS[flaw]], "master", words, severity)
+    habit = seen.miscounted_requests
+    if habit is not None:
+        severity = Severity.ERROR if habit.count == seen.requests else Severity.WARNING
+        yield wrongly_checked("master", habit, counted(seen.requests, "request"), severity)
 
 
 def _of_masters(seen: BusRecord) -> Iterator[Finding]:
@@ -299,20 +304,39 @@ def _too_close(seen: BusRecord) -> Iterator[Finding]:
 
 
 def _of_ends(seen: BusRecord) -> Iterator[Finding]:
-    """Frames without LF: of those who leave it out while others send it; where all do, it is how this bus speaks."""
-    habits = {
-        sender: tally
-        for sender, tally in sorted(seen.bare_ends.items())
-        if tally.count >= _BARE_LEAST and _HABIT * tally.count >= seen.frames[sender]
-    }
-    if len(habits) > 1 and len(habits) == len(seen.frames):
-        among = together(habits.values())
-        words = f"{counted(among.count, 'frame')} end with CR alone, whoever sends"
-        yield among.found(RULES["MB019"], "bus", words, Severity.NOTE)
-        return
-    for sender, tally in habits.items():
-        words = f"{tally.count} of {counted(seen.frames[sender], 'frame')} end with CR alone"
-        yield tally.found(RULES["MB019"], sender, words)
+    """Frames that end otherwise than with CR LF: of those who end so while others do not; where all do, it is how this
+    bus speaks, or what is between it and us makes it so."""
+    for end in OddEnd:
+        habits = {
+            sender: tally
+            for (how, sender), tally in sorted(seen.odd_ends.items(), key=lambda item: item[0][1])
+            if how is end and tally.count >= _ODD_LEAST and _HABIT * tally.count >= seen.frames[sender]
+        }
+        if habits and len(habits) == len(seen.frames):
+            if len(habits) > 1:
+                among = together(habits.values())
+                words = f"{counted(among.count, 'frame')} end with {end.value}, whoever sends"
+                yield _of_end(end, among.found(RULES["MB019"], "bus", words, Severity.NOTE))
+                continue
+            if end is OddEnd.LF_ALONE:
+                continue  # not one frame is good, and a terminal may have taken CR away: see LN003
+        for sender, tally in habits.items():
+            words = f"{tally.count} of {counted(seen.frames[sender], 'frame')} end with {end.value}"
+            is_nothing_good = sender == "master" and end.is_damage and tally.count == seen.requests
+            yield _of_end(end, tally.found(RULES["MB019"], sender, words, Severity.ERROR if is_nothing_good else None))
+
+
+def _of_end(end: OddEnd, finding: Finding) -> Finding:
+    """The finding with what such an end means; the rule speaks of CR alone."""
+    if end is OddEnd.CR_ALONE:
+        return finding
+    if end is OddEnd.CR_CR_LF:
+        means = "a converter or a terminal server on the way makes CR LF of each LF; or the device sends CR twice"
+        following = "newline translation in whatever is on the way; the device's end characters"
+    else:
+        means = "the device ends its frames as lines of text, or something on the way takes CR away"
+        following = "the device's end characters; newline translation in whatever is on the way"
+    return replace(finding, means=means, next=following)
 
 
 def _common_damage(seen: BusRecord, damage: DamageShare) -> list[Finding]:

@@ -210,13 +210,15 @@ ANSWER_RULES = (
     Rule(
         "MB019",
         Severity.WARNING,
-        "frames end without line feed",
-        "ASCII frames that end with CR, and nothing where LF should be (Modbus over Serial Line V1.02, 2.5.2): at "
-        "least three, and 1 in 10 of the sender's. They are read as good. A note where everybody on the bus ends so.",
+        "frames do not end with CR LF",
+        "ASCII frames that are whole and end with CR alone, LF alone, LF CR or CR CR LF (Modbus over Serial Line V1.02"
+        ", 2.5.2): at least three, and 1 in 10 of the sender's. Those with CR in its place are read as good; who waits "
+        "for CR finds no end in the others, which are damaged here, too. A note where everybody on the bus ends so; an "
+        "error where no request is good.",
         "a driver that is released before the last octet is out, or a device that ends its frames with CR alone; "
         "others may wait for the LF and drop the frame",
         "its turnaround or transmit-delay setting, a converter's timer for the direction; its end character",
-        explains=("MB104",),
+        explains=("MB001", "MB104", "MB009", "MB022", "LN003", "LN202", "LN203", "LN204", *_OF_DAMAGE),
     ),
     Rule(
         "MB020",
@@ -235,12 +237,14 @@ ANSWER_RULES = (
         "MB021",
         Severity.WARNING,
         "check always wrong",
-        "A station of which no good answer was heard, and answers without a line error whose check alone is wrong: at "
-        "least five, and 3 in 4 of the damaged ones, differ from the right one in the same bits as others of their "
-        "length that say something else, or as a check does that begins with 0. Noise changes other bits each time.",
+        "A station or a master of which hardly a good frame was heard, and frames without a line error whose check "
+        "alone is wrong: at least five, and 3 in 4 of the damaged ones, differ from the right one in the same bits as "
+        "others of their length that say something else, or as a check does that begins with 0; or are made by another "
+        "rule each time (an LRC that is not negated, or of the characters; a CRC in its place; all zeros or ones; left "
+        "out). Noise changes other bits each time. An error where no request is good: no station can answer.",
         "the device computes its check otherwise: another start value or polynomial, or over other octets",
         "the device's firmware; whether a converter on the way changes octets",
-        explains=("MB001", *_OF_DAMAGE),
+        explains=("MB001", "MB009", "MB104", "LN003", *_OF_DAMAGE),
     ),
     Rule(
         "MB022",

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from dissectors.checksums import crc16_modbus
 from dissectors.findings import EVIDENCE_MAX, Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Flaw
 from dissectors.late_speakers import reaching
@@ -20,6 +19,7 @@ from dissectors.modbus.response_groups import AnsweredRequest
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.station_record import Key, Requested, StationRecord, middle
 from dissectors.words import duration, fine_milliseconds
+from dissectors.wrong_checks import Habit
 
 SILENT_AT_END = 5
 """Unanswered requests in a row to the end, from which on a station that used to answer has fallen silent."""
@@ -39,7 +39,6 @@ _PROBED = 8  # times that something else is asked for each try
 _NEARLY_ALL_LEAST = 10  # damaged answers
 _GARBLED_LEAST = 5  # damaged answers that are no frame at all
 _TEXT_SHOWN = 24
-_WRONG_CHECKS = 5  # answers, at least
 _SYSTEM_LEAST = 3  # of one kind, before it is a system
 _EXCESS_SPREAD = 2  # octets
 _HEX_SHOWN = 16
@@ -215,21 +214,17 @@ def _flawed(seen: BusRecord, name: str, station: StationRecord) -> Iterator[Find
 
 def _miscounted(name: str, station: StationRecord) -> Finding | None:
     """Checks that are always wrong, in frames that are right otherwise."""
-    always: dict[int, Tally] = {}  # the commonest difference among frames of one length
-    for (difference, octets), wrong in station.wrong_checks.items():
-        if not octets:  # many others, each of its own
-            continue
-        begun_with_0 = difference == int.from_bytes(crc16_modbus(bytes(octets - 2)).to_bytes(2, "little"), "big")
-        is_system = len(wrong.right) > 1 or begun_with_0  # the same octets again may be spoilt alike
-        if is_system and (octets not in always or wrong.tally.count > always[octets].count):
-            always[octets] = wrong.tally
-    same = [tally for tally in always.values() if tally.count >= _SYSTEM_LEAST]
-    count, flawed = sum(tally.count for tally in same), sum(tally.count for tally in station.flaws.values())
-    few = count < _WRONG_CHECKS or 4 * count < 3 * station.damaged.count
-    if few or station.times.count or 2 * flawed > count:
+    habit = station.miscounted
+    if habit is None:
         return None
-    words = f"{count} of {counted(station.asked, 'answer')} right but for the check, which always differs alike"
-    return replace(max(same, key=lambda tally: tally.count).found(RULES["MB021"], name, words), count=count)
+    return wrongly_checked(name, habit, counted(station.asked, "answer"))
+
+
+def wrongly_checked(name: str, habit: Habit, of: str, severity: Severity | None = None) -> Finding:
+    """What a sender does with its checks. `of`: how many frames of its kind there were, in words."""
+    words = f"{habit.count} of {of} right but for the check, {habit.mistake.words}"
+    finding = habit.tally.found(RULES["MB021"], name, words, severity)
+    return replace(finding, count=habit.count, means=habit.mistake.means or finding.means)
 
 
 def _foreign(seen: BusRecord, name: str, station: StationRecord) -> Finding | None:

@@ -12,6 +12,7 @@ from dissectors.frame import Flaw
 from dissectors.modbus.garbage import Garbage
 from dissectors.modbus.response_groups import AnsweredRequest, SameRequest
 from dissectors.tracker import Interval
+from dissectors.wrong_checks import Habit, WrongChecks
 
 KEYS_KEPT = 512
 """Most different requests, or exceptions, of a station that are counted apart."""
@@ -20,7 +21,6 @@ SAME_KEPT = 8
 """Requests of a station whose answers are compared with each other."""
 
 _BLOCKS = 64
-_CHECKS_KEPT = 64
 _NEARLY_ALL = 4  # of five
 _PERIODS = 256
 
@@ -149,20 +149,6 @@ class Lost:
 
 
 @dataclass(slots=True)
-class WrongCheck:
-    """Answers of one length whose check differs from the right one in the same bits. `right`: two of the right ones."""
-
-    tally: Tally = field(default_factory=Tally)
-    right: set[int] = field(default_factory=set)
-
-    def add(self, time: int, no: int, right: int) -> None:
-        """Take the next one."""
-        self.tally.add(time, no)
-        if len(self.right) < 2:
-            self.right.add(right)
-
-
-@dataclass(slots=True)
 class StationRecord:
     """One station. `missing`: no octet followed. `silent`: those since its last sign of life. `unheard`: of those that
     are missing such after which the master went on as after an answer."""
@@ -176,7 +162,7 @@ class StationRecord:
     cut: int = 0  # of the damaged answers: ended early
     last_octet: Tally = field(default_factory=Tally)  # only the last octet is wrong
     first_lost: Tally = field(default_factory=Tally)  # only the first octet is wrong; when: ns after the request
-    wrong_checks: dict[tuple[int, int], WrongCheck] = field(default_factory=dict)  # by difference, and length of frame
+    checks: WrongChecks = field(default_factory=WrongChecks)  # of the damaged answers
     talked_over: Tally = field(default_factory=Tally)  # begun as an answer, and longer than it can be
     outlasting: Tally = field(default_factory=Tally)  # the same, and not over when the master gave up
     excess: list[int] = field(default_factory=list)  # octets by which those were too long
@@ -210,7 +196,16 @@ class StationRecord:
     def explained(self) -> int:
         """How many damaged answers are no damage of the line: always the same, or always in the same way."""
         flawed = sum(tally.count for tally in self.flaws.values() if tally.count >= 3)
+        miscounted = self.miscounted
+        flawed += miscounted.count if miscounted is not None else 0
         return flawed + (self.garbage.tally.count if self.garbage.is_system else 0)
+
+    @property
+    def miscounted(self) -> Habit | None:
+        """What its answers have in common that are right but for the check; None where that is not its own doing."""
+        habit = self.checks.habit(self.damaged.count, self.times.count)
+        flawed = sum(tally.count for tally in self.flaws.values())
+        return habit if habit is not None and 2 * flawed <= habit.count else None
 
     @property
     def is_unheard(self) -> bool:
@@ -231,13 +226,6 @@ class StationRecord:
                 key = ("other requests", None)
             request = self.requests.setdefault(key, Requested())
         return request
-
-    def wrong_check(self, difference: int, octets: int) -> WrongCheck:
-        """The record of answers whose check differs so, without a line error; one for others beyond _CHECKS_KEPT."""
-        kind = difference, octets
-        if kind not in self.wrong_checks and len(self.wrong_checks) >= _CHECKS_KEPT:
-            kind = 0, 0
-        return self.wrong_checks.setdefault(kind, WrongCheck())
 
     def exception(self, key: Key, code: int) -> Tally:
         """The record of one exception to one kind of request; beyond KEYS_KEPT, one for all others."""

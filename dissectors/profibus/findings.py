@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, times
 from dissectors.frame import Event, Frame, Header, Role
@@ -16,9 +17,11 @@ from dissectors.profibus.rules import RULES, usual_tsdr
 from dissectors.profibus.slave_watch import SlaveView
 from dissectors.profibus.watch import BusWatch, Notice
 from dissectors.subject import BUS, Subject, station
-from dissectors.tracker import Placement, Transaction
+from dissectors.tracker import Placement, Transaction, Verdict
 from dissectors.words import milliseconds
 
+_ALIKE_LEAST = 5
+_BAD_KEPT = 64  # damaged telegrams whose exchange is not over
 _LEAST = 3
 _SHARE = 0.01
 _SLOW_SHARE = 0.1
@@ -51,6 +54,7 @@ class ProfibusFindings:
         self._diagnosed: dict[int, dict[str, Tally]] = defaultdict(lambda: defaultdict(Tally))
         self._silent: dict[int, int] = {}  # when a slave last left because that master was silent, ns
         self._damaged = Tally()
+        self._bad: dict[int, Frame] = {}  # the newest of them by row
         self._frames = 0
         self._passed: dict[int, int] = defaultdict(int)  # tokens to each master
         self._told: dict[int, int] = defaultdict(int)  # tokens and requests from each master
@@ -61,6 +65,9 @@ class ProfibusFindings:
             self._frames += 1
             if not event.ok:
                 self._damaged.add(event.start, no)
+                self._bad[no] = event
+                if len(self._bad) > _BAD_KEPT:
+                    del self._bad[next(iter(self._bad))]
             elif header is not None:
                 self._count(header)
                 if header.role is Role.REQUEST and header.destination is not None:
@@ -85,7 +92,11 @@ class ProfibusFindings:
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
         if transaction.station is not None and not transaction.is_passing:
-            self.records[transaction.station].settle(transaction, self.slow_of(transaction.station))
+            record = self.records[transaction.station]
+            record.settle(transaction, self.slow_of(transaction.station))
+            bad = self._bad.pop(transaction.response or 0, None)
+            if bad is not None and transaction.verdict is Verdict.DAMAGED_ANSWER:
+                record.see_damaged(transaction.response or 0, bad)
 
     def know_response_times(self, most: Callable[[int], int | None]) -> None:
         """Let a device's GSD say how long it may take, where there is one."""
@@ -143,6 +154,7 @@ class ProfibusFindings:
         yield from self._of_repeats()
         for address in sorted(self.watch.slaves):
             yield from self._of_diagnosis(address, self.watch.slaves[address])
+        yield from self._of_alike()
         yield from self._of_damage()
         yield from self._of_masters()
 
@@ -251,6 +263,20 @@ class ProfibusFindings:
             "PB009": slave.has_trouble,
         }.get(code, True)
         return RULES[code].severity if still else Severity.NOTE
+
+    def _of_alike(self) -> Iterator[Finding]:
+        """Answers of a slave that are always damaged in the same way."""
+        for address, one in sorted(self.records.items()):
+            damaged, answers = one.damaged.count, counted(one.requests, "answer")
+            habit = one.checks.habit(damaged, one.answers - damaged) or one.checks.same(damaged)
+            flaw, tally = max(one.flaws.items(), key=lambda item: item[1].count, default=(None, Tally()))
+            if habit is not None:
+                seen = f"{habit.count} of {answers} right but for the sum, {habit.mistake.words}"
+                finding = habit.tally.found(RULES["PB020"], station(address), seen)
+                yield replace(finding, means=habit.mistake.means or finding.means)
+            elif flaw is not None and tally.count >= _ALIKE_LEAST and 4 * tally.count >= 3 * damaged:
+                seen = f"{tally.count} of {answers} good but for one thing: {flaw.value}"
+                yield tally.found(RULES["PB020"], station(address), seen)
 
     def _of_damage(self) -> Iterator[Finding]:
         damaged = self._damaged

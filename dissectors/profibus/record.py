@@ -6,9 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from dissectors.findings import EVIDENCE_MAX, Tally
+from dissectors.frame import Flaw, Frame
+from dissectors.profibus.check_mistakes import ways
 from dissectors.profibus.services import Service
 from dissectors.profibus.telegram import parse
 from dissectors.tracker import Transaction, Verdict
+from dissectors.wrong_checks import WrongChecks
 
 _EXCHANGE = Service.DATA_EXCHANGE.value
 _WELL = frozenset((Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION))
@@ -42,6 +45,8 @@ class RequestsRecord:
     exchanged: int = 0
     put_off: int = 0
     unheard: int = 0
+    checks: WrongChecks = field(default_factory=WrongChecks)  # of the damaged answers
+    flaws: dict[Flaw, Tally] = field(default_factory=dict)  # likewise: of those that one change makes good
     _newest: tuple[int, bytes] | None = None  # the newest request: its row and octets
     _previous: tuple[int, bytes] | None = None
     _silent: tuple[int, bytes] | None = None  # the newest request, where it is known that no answer was heard
@@ -62,6 +67,12 @@ class RequestsRecord:
     def silent(self) -> int:
         """Requests without answer that the master may not have had an answer to, either."""
         return self.unanswered.count - self.unheard
+
+    def see_damaged(self, no: int, answer: Frame) -> None:
+        """Take a damaged answer, in that row."""
+        self.checks.see(no, answer.end, ways(answer))
+        if answer.repair is not None:
+            self.flaws.setdefault(answer.repair.flaw, Tally()).add(answer.end, no)
 
     def settle(self, closed: Transaction, slow: int) -> None:
         """Take an exchange with it. `slow`: ns that an answer may take."""

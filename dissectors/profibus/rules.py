@@ -203,6 +203,18 @@ RULES: dict[str, Rule] = {
             "the controller was stopped, restarted or too busy, or the token came round too late",
             "what the controller did then; the watchdog time of the project against the time of a round",
         ),
+        Rule(
+            "PB020",
+            Severity.WARNING,
+            "damaged always in the same way",
+            "Answers of one station that are right but for their sum (FCS): at least five, and 3 in 4 of its damaged "
+            "ones, with no line error, differ from the right one by the same number though they say different things, "
+            "are made by another rule each time (exclusive or, a complement, zeros or ones), or are octet for octet "
+            "the same; or so many lack one and the same octet, or have it spoilt. Noise changes other bits each time.",
+            "the device computes its sum otherwise; or a driver that is switched too late or too soon",
+            "the device's firmware; whether something on the way changes or swallows octets",
+            explains=("PB001", "PB002", "PB003", "PB007", "PB008", *_LINE),
+        ),
     )
 }
 """The catalogue, by code."""

@@ -37,7 +37,9 @@ def as_sent(sample: Sequence[Chunk]) -> Iterator[LineEnds]:
     if _TWO.search(octets) is not None:
         yield LineEnds("with CR LF for each LF LF", changed, _cut(_TWO.sub(b"\r\n", octets), sample))
     whole = [replace(chunk, octets=chunk.octets.replace(b"\n", b"\r\n"), marks=()) for chunk in sample]
-    yield LineEnds("with CR LF for each LF", "a port that was not set raw dropped CR (igncr)", whole)
+    yield LineEnds(
+        "with CR LF for each LF", "a port that was not set raw dropped CR (igncr); or LF alone is what was sent", whole
+    )
     yield LineEnds("with CR for each LF", changed, _cut(octets.replace(b"\n", b"\r"), sample))
 
 

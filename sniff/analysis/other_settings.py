@@ -151,7 +151,7 @@ def _by_values(sample: Sequence[Chunk], line: LineSettings) -> Iterator[Fit]:
         return
     bits = 5 if top <= 0x1F else 6 if top <= 0x3F else 7
     text = sum(count for value, count in values.items() if value in _TEXT)
-    if bits == 7 and text >= 0.95 * total:
+    if text >= 0.95 * total:
         return  # a protocol of text that nobody here knows
     seen = f"no octet of {total} is above {(1 << bits) - 1:02X}"
     port = f"the port is set to {line}" if line.data_bits < 8 else "the octets went through something that has no more"

@@ -21,6 +21,7 @@ from dissectors.simulated_faults import (
 from sniff.simulation.tap import EXACT, FTDI
 from tests.faults.buses import modbus, n2
 from tests.faults.case import Case
+from tests.faults.check_cases import CHECK_CASES
 from tests.faults.drive_cases import DRIVE_CASES
 from tests.faults.hearing import (
     counting,
@@ -218,5 +219,12 @@ CASES: tuple[Case, ...] = (  # of each a capture is kept in captures/findings
     *LATE_CASES,
 )
 
-FURTHER_CASES: tuple[Case, ...] = (*MODBUS_CASES, *N2_CASES, *LINE_CASES, *MSTP_CASES, *FURTHER_LATE_CASES)
+FURTHER_CASES: tuple[Case, ...] = (
+    *CHECK_CASES,
+    *MODBUS_CASES,
+    *N2_CASES,
+    *LINE_CASES,
+    *MSTP_CASES,
+    *FURTHER_LATE_CASES,
+)
 """What is the same each time, time patterns, tokens. Written from the true cause; no captures are kept of them."""

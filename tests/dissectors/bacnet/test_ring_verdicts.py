@@ -185,8 +185,8 @@ def test_damage_after_a_poll_to_an_empty_address_is_nobodys_answer():
 def test_repeated_damage_proves_no_second_station():
     """Whatever it is that spoils 5's answers, its address is not taken twice."""
     steps = rounds(5, 2, 5)
-    for _ in range(10):
-        answer = spoil(data(5, 2, VALUE), 9)
+    for place in range(9, 19):
+        answer = spoil(data(5, 2, VALUE), place)
         steps += [(2, data(2, 5, READ, expects=True)), (20, answer), *rounds(2, 2, 5)]
     read = script(steps)
     assert read.graves() == {("MS402", "MAC 5")}
