@@ -190,7 +190,7 @@ class ModbusFindings(RowObserver):
             return
         if transaction.response in self.no_requests:
             return
-        if not self.seen.requests and self.seen.answers == 1:
+        if transaction.response == self.before_all:
             return  # the capture began between a request and its answer
         if transaction.id in self.damaged:  # more likely a request, when nobody was asked
             octets = ended[2].octets if ended is not None else b""

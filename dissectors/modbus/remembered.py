@@ -78,6 +78,7 @@ class Remembered:
         self.copied: deque[int | None] = deque(maxlen=64)  # the last transactions whose request came twice at once
         self.no_requests: deque[int] = deque(maxlen=64)  # frames that the tracker takes for requests, but are none
         self.damaged: deque[int] = deque(maxlen=64)  # transactions of the last damaged answers
+        self.before_all: int | None = None  # the row of the first answer, if no request came before it
         self.contradictory: deque[int] = deque(maxlen=64)  # transactions whose good answer contradicts itself
         self.flaws: dict[int, Flaw] = {}  # of damaged frames, by transaction
         self.newest: int | None = None  # the transaction of the newest request

@@ -146,6 +146,8 @@ class RowObserver(Remembered):
             self.seen.hasty.append((gap + before.frame.slack, before.unit, asked.frame.start, before.no, asked.no))
 
     def _see_answer(self, no: int, frame: Frame, header: Header, placement: Placement, octets: bytes) -> None:
+        if not self.seen.answers and not self.seen.requests:
+            self.before_all = no
         self.seen.answers += 1
         if self.broadcast is not None and frame.start - self.broadcast.frame.end < TURNAROUND:
             self.seen.answers_to_broadcast.add(frame.start, self.broadcast.no, no)

@@ -51,3 +51,18 @@ def test_damage_just_before_a_late_read_counts_both_ways():
     (one,) = (finding for finding in judging.findings() if finding.code == "MB011")
     assert one.count == 5
     assert one in findings_of(session, items)
+
+
+def test_an_answer_before_all_requests_is_excused_both_ways():
+    """A capture that begins in the middle of an exchange, its first rows in one read."""
+    said = b"\x78" + seal_rtu(bytes((19, 3, 2, 7, 0x6C)))
+    for turn in range(12):
+        said += seal_rtu(bytes((19, 3, 0, turn, 0, 1))) + seal_rtu(bytes((19, 3, 2, 7, turn)))
+    session = Session("x", LINE, "modbus-rtu", adapter=Adapter("hub", "", 50 * MS, "measured"))
+    items = [Chunk(500 * MS, said)]
+    judging = Judging(session, dissector_for(session))
+    for output in outputs(items, session):
+        if isinstance(output, Output):
+            judging.add(output)
+    assert judging.findings() == findings_of(session, items)
+    assert not [finding for finding in judging.findings() if finding.code == "MB207"]
