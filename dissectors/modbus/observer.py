@@ -154,17 +154,14 @@ class ModbusFindings(RowObserver):
     # ---- transactions
 
     def _is_torn(self, transaction: Transaction, asked: AskedRequest | None) -> bool:
-        """Whether a late read made of it what it seems; where a station's frames are so often, it is the station."""
+        """Whether a late read, or a pause of the sender, made of it what it seems: LN206 tells whose are torn."""
         verdict, torn = transaction.verdict, self.torn
         if verdict in (Verdict.UNSOLICITED, Verdict.LATE, Verdict.ANSWERED_TWICE):
             return torn.may_answer(transaction.response)
         is_either = asked is not None and asked.header.role is Role.EITHER
         if verdict is Verdict.NO_RESPONSE and is_either and torn.may_answer(transaction.request):
             return True  # no request, but the confirmation of the one that was torn
-        if verdict not in _MAY_BE_TORN or not torn.is_torn(transaction.id):
-            return False
-        unit = transaction.station
-        return unit is None or torn.is_seldom(unit, self.station(unit).asked)
+        return verdict in _MAY_BE_TORN and torn.is_torn(transaction.id)
 
     def _see_end(self, unit: int, no: int, frame: Frame) -> None:
         """How a damaged answer of a station, in that row, ended."""

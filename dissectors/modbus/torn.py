@@ -5,12 +5,13 @@ never was, and the rest comes with all that followed. Where the read is no longe
 octets back, its time proves nothing (`Frame.slack` is the adapter's). But the pieces, put together as they were heard,
 are a good frame again, and no damage makes one.
 
-A station that pauses inside its frames does the same, though in many of them: what is torn often is damage after all.
+A station that pauses inside its frames does the same. Whose frames are torn more than those of others is told of the
+line (LN206), where all senders are compared; here none of it is damage.
 """
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import deque
 from typing import Final
 
 from dissectors.checksums import crc16_modbus, lrc
@@ -19,11 +20,6 @@ from dissectors.modbus.envelope import ASCII_NAME, hex_pairs
 
 PIECES: Final = 8
 """Most rows that one torn frame is."""
-
-SELDOM: Final = 20
-"""One in so many exchanges of a station a computer may tear; and FREE of them before anything can be said."""
-
-FREE: Final = 3
 
 _LONGEST = 513  # octets of an ASCII frame
 _KEPT = 64
@@ -39,7 +35,6 @@ class TornFrames:
         self._torn: deque[int] = deque(maxlen=_KEPT)
         self._behind: deque[int] = deque(maxlen=2 * _KEPT)  # rows of last pieces, and those after them
         self._is_ascii = False
-        self._counts: Counter[int] = Counter()  # torn transactions, by station
 
     def see(self, no: int, event: Event, transaction: int | None, *, is_good_frame: bool) -> None:
         """Take a row; `transaction`: the one it belongs to, of noise that of the newest request."""
@@ -65,11 +60,6 @@ class TornFrames:
     def may_answer(self, response: int | None) -> bool:
         """Whether what is in this row may be the answer to a torn request."""
         return response in self._behind
-
-    def is_seldom(self, station: int, asked: int) -> bool:
-        """Count one of a station that was asked so often; whether so few may be the computer's doing."""
-        self._counts[station] += 1
-        return self._counts[station] <= max(FREE, asked // SELDOM)
 
     def _is_whole(self) -> bool:
         if sum(map(len, self._pieces)) > _LONGEST:

@@ -1,12 +1,18 @@
-"""Damage of frames that a late read tore is nobody's; what is torn often is."""
+"""Damage of frames that a late read tore is nobody's."""
 
 from __future__ import annotations
 
+from random import Random
+
 import pytest
 
-from dissectors.frame import Check, Damage, FoundBy, Frame, Noise, Place, Reason
+from dissectors.findings import Severity
+from dissectors.frame import Check, Chunk, Damage, FoundBy, Frame, Noise, Place, Reason
+from dissectors.line import LineSettings
 from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, seal_ascii, seal_rtu
-from dissectors.modbus.torn import FREE, SELDOM, TornFrames
+from dissectors.modbus.torn import TornFrames
+from sniff.engine.session import Adapter, Session
+from tests.faults.judged import findings_of
 
 RTU = seal_rtu(bytes.fromhex("01 03 04 00 01 00 02"))
 ASCII = seal_ascii(bytes.fromhex("01 03 04 00 01 00 02"))
@@ -56,9 +62,20 @@ def test_characters_with_a_parity_bit_and_rubbish_raise_nothing() -> None:
         torn.see(no, _noise(bytes((no * 37 % 256,)) * no), None, is_good_frame=False)
 
 
-def test_a_station_whose_frames_are_often_torn_pauses_itself() -> None:
-    torn = TornFrames()
-    assert all(torn.is_seldom(3, 10) for _ in range(FREE))
-    assert not torn.is_seldom(3, 10)
-    assert torn.is_seldom(3, 5 * SELDOM)
-    assert torn.is_seldom(4, 10)
+def test_what_late_reads_often_tear_is_no_stations_damage() -> None:
+    """Two stations whose long answers take a third of the time: of each, one answer in nine is read in two parts."""
+    now, chunks, dice = 0, [], Random(1)
+    for turn in range(180):
+        unit = 1 + turn % 2
+        now += 90_000_000
+        chunks.append(Chunk(now, seal_rtu(bytes((unit, 3, 0, 0, 0, 60)))))
+        answer = seal_rtu(bytes((unit, 3, 120)) + bytes(range(120)))
+        cut = dice.randrange(20, 100) if dice.random() < 0.12 else 0
+        now += 50_000_000
+        if cut:
+            chunks.append(Chunk(now, answer[:cut]))
+            now += 80_000_000
+        chunks.append(Chunk(now, answer[cut:]))
+    session = Session("x", LineSettings.parse("38400,8N1"), "modbus-rtu", adapter=Adapter("a", "", 16_000_000, "said"))
+    graves = {(one.code, one.subject) for one in findings_of(session, chunks) if one.severity >= Severity.WARNING}
+    assert not graves
