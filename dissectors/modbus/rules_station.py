@@ -236,6 +236,9 @@ def _foreign(seen: BusRecord, name: str, station: StationRecord) -> Finding | No
     if same is not None and 2 * garbage.begun > garbage.tally.count:
         words = f"{counted(garbage.tally.count, 'damaged answer')}, always the same {_octets(len(same))}: {_hex(same)}"
         return garbage.tally.found(RULES["MB015"], name, words)
+    text = garbage.text()
+    if factor is None and text is None and station.answered > garbage.tally.count:
+        return None  # it speaks as this line does; what falls on its answers always begins so late
     words = f"{times(garbage.tally.count)} something that is not this protocol came in answer"
     if same is not None:
         words += f", always the same {_octets(len(same))}: {_hex(same)}"
@@ -243,7 +246,7 @@ def _foreign(seen: BusRecord, name: str, station: StationRecord) -> Finding | No
         baud = seen.timing.line.baud
         rates = f": about {baud // factor} Bd, not {baud}" if seen.timing.has_rate else ", whose baud rate nobody said"
         words += f"; its bits are {factor} times as long as those of this line{rates}"
-    elif (text := garbage.text()) is not None:
+    elif text is not None:
         words += f"; it is text{f' with 7 data bits and {text[1]} parity' if text[1] else ''}: {_quoted(text[0])}"
     return garbage.tally.found(RULES["MB014"], name, words)
 
