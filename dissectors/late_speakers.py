@@ -49,10 +49,11 @@ class Window:
     """What came while the late answer of one station was due.
 
     `opened`: how often it was waited for; `struck`, `whole`: frames by sender; `shown`: damaged ones that show that it
-    spoke; `silenced`: requests to others that nothing followed.
+    spoke; `silenced`: requests to others that nothing followed; `behind`: damaged requests directly behind the wait.
     """
 
     opened: int = 0
+    behind: Tally = field(default_factory=Tally)
     damage: Tally = field(default_factory=Tally)
     struck: Counter[str] = field(default_factory=Counter)
     whole: Counter[str] = field(default_factory=Counter)
@@ -97,6 +98,7 @@ class LateSpeakers:
         self.damaged: Counter[str] = Counter()  # everywhere, by sender
         self.until = 0  # when all windows are closed again
         self._open: dict[int, _Open] = {}
+        self._newest: int | None = None  # who was waited for in vain, while no other request has come
 
     def unanswered(self, station: int, due: Due, start: int, end: int, patience: int | None) -> None:
         """A whole request that nothing followed. `patience`: the master's, where it is known."""
@@ -106,6 +108,7 @@ class LateSpeakers:
                 self._window(other).silenced[station] += 1
         lasts = LASTS * (PATIENCE if patience is None else min(patience, PATIENCE))
         self._window(station).opened += 1
+        self._newest = station
         self._open[station] = _Open(end + lasts, lasts, due)
         if len(self._open) > _OPEN_KEPT:
             del self._open[next(iter(self._open))]
@@ -113,6 +116,8 @@ class LateSpeakers:
 
     def answered(self, station: int, sender: str, start: int) -> None:
         """A whole request and a whole answer to it."""
+        if start < self.until:
+            self._newest = None
         for other in self._due(start):
             window = self._window(other)
             window.whole[MASTER] += 1
@@ -124,6 +129,9 @@ class LateSpeakers:
     def damaged_request(self, octets: bytes, start: int, *rows: int | None) -> None:
         """A damaged request."""
         self.damaged[MASTER] += 1
+        if self._newest is not None and start < self.until:
+            self._window(self._newest).behind.add(start, *rows)
+            self._newest = None
         for other in self._due(start):
             self._strike(other, MASTER, start, rows, self._open[other].due.is_shown_by(octets, is_answer=False))
 
@@ -133,6 +141,8 @@ class LateSpeakers:
         """A whole request, and something damaged in answer. `start`: of the request. `is_longer`: it begins as the
         answer that was asked for, and is longer than that can be."""
         self.damaged[sender] += 1
+        if start < self.until:
+            self._newest = None
         for other in self._due(start):
             self._window(other).whole[MASTER] += 1
             if other != station:
@@ -258,6 +268,16 @@ def late_speakers(late: LateSpeakers, whole: Mapping[str, int], heard: Mapping[i
         if found is not None and (known.answers or known.late or found.is_sure):
             innocent |= found.silenced
             yield found
+
+
+def is_behind(struck: int, damaged: int, silent: int, requests: int) -> bool:
+    """Whether so many damaged requests stand directly behind one station's waits in vain as chance does not explain.
+
+    `struck` of all `damaged` requests stand there; `silent` of all `requests` were to it and nothing answered them.
+    """
+    if not _LEAST <= struck <= damaged or 5 * struck < 4 * damaged or silent >= requests:
+        return False
+    return at_least(struck, damaged, silent / requests) < _SELDOM
 
 
 def _judge(

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, found, times, together
-from dissectors.late_speakers import MASTER, NOBODY, Heard, late_speakers, told
+from dissectors.late_speakers import MASTER, NOBODY, Heard, is_behind, late_speakers, told
 from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.damage_shares import DamageShare, shares_of_damage, to_blame
@@ -370,6 +370,13 @@ def _of_late_speakers(seen: BusRecord) -> Iterator[Finding]:
         made = one.window.damage.found(RULES["MB106"], f"station {one.station}", told(one), severity)
         yield replace(made, stations=(one.station, *sorted({*hit, *one.silenced} - {one.station})))
     for unit, station in sorted(seen.stations.items()):
+        behind = seen.late_speakers.windows[unit].behind if unit in seen.late_speakers.windows else Tally()
+        silent, damaged = station.missing.count + station.late.count, seen.late_speakers.damaged[MASTER]
+        if unit not in named and station.answered and is_behind(behind.count, damaged, silent, seen.requests):
+            named.add(unit)
+            words = f"{behind.count} of {counted(damaged, 'damaged request')} came directly behind "
+            words += "a request to it that nothing had answered"
+            yield behind.found(RULES["MB106"], f"station {unit}", words)
         many = 4 * station.outlasting.count >= station.damaged.count
         if station.outlasting.count >= _COMMON_LEAST and many and unit not in named:
             words = f"{counted(station.outlasting.count, 'answer')} not over when the master gave up, which then spoke"

@@ -4,19 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Final
 
-from dissectors.chances import at_least
 from dissectors.findings import Finding, counted
-from dissectors.late_speakers import MASTER, NOBODY, Heard, LateSpeakers, late_speakers, told
+from dissectors.late_speakers import MASTER, NOBODY, Heard, LateSpeakers, is_behind, late_speakers, told
 from dissectors.n2.record import N2StationRecord
 from dissectors.n2.rules import RULES
 from dissectors.n2.wording import N2Evidence
-
-LEAST: Final = 3
-"""Damaged commands behind unanswered ones, before anything is said."""
-
-SELDOM: Final = 0.002
 
 
 def of_late_speakers(heard: N2Evidence, late: LateSpeakers) -> Iterator[Finding]:
@@ -40,9 +33,6 @@ def of_late_speakers(heard: N2Evidence, late: LateSpeakers) -> Iterator[Finding]
 
 def _is_behind(heard: N2Evidence, station: N2StationRecord) -> bool:
     """Whether damaged commands stand behind unanswered ones to a station that is there, more than chance explains."""
-    struck, bad, commands = station.behind.count, heard.master.bad.count, heard.master.frames
-    silent = station.missing.count + station.late.count
     is_there = station.answered or station.late.count or station.sent.bad.count
-    if not LEAST <= struck <= bad or 5 * struck < 4 * bad or not is_there or not silent < commands:
-        return False
-    return at_least(struck, bad, silent / commands) < SELDOM
+    silent = station.missing.count + station.late.count
+    return bool(is_there) and is_behind(station.behind.count, heard.master.bad.count, silent, heard.master.frames)

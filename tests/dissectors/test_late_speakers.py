@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from dissectors.late_speakers import MASTER, Due, Heard, LateSpeaker, LateSpeakers, late_speakers
+from dissectors.late_speakers import MASTER, Due, Heard, LateSpeaker, LateSpeakers, is_behind, late_speakers
 
 MS = 1_000_000
 WAIT = 200 * MS
@@ -58,3 +58,17 @@ def test_who_never_answers_is_believed_to_speak_only_where_its_address_shows_it(
         late.damaged_answer(1, "station 1", b"\x09\x03", turn * 300 * MS + WAIT, 1, is_longer=False)
     (sure,) = late_speakers(late, whole, {9: Heard(0, 0, 60)})
     assert sure.is_sure
+
+
+@pytest.mark.parametrize(("damaged", "elsewhere", "is_told"), [(9, 0, True), (2, 0, False), (9, 3, False)])
+def test_requests_damaged_directly_behind_one_stations_silence(damaged: int, elsewhere: int, is_told: bool) -> None:
+    late, now = LateSpeakers(), 0
+    for turn in range(200):
+        now += 100 * MS
+        late.answered(1, "station 1", now)
+        if turn % 10 == 0 and turn // 10 < damaged:
+            late.unanswered(9, Due(b"\x09"), now, now + 8 * MS, WAIT)
+            late.damaged_request(b"", now + WAIT, turn)
+        elif turn < elsewhere * 10 and turn % 10 == 5:
+            late.damaged_request(b"", now, turn)
+    assert is_behind(late.windows[9].behind.count, late.damaged[MASTER], damaged, 200 + 2 * damaged) is is_told

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 from functools import partial
 
+from dissectors.line import LineSettings
+from dissectors.modbus.simulated_master import read_holding
+from dissectors.simulated_faults import LateResponse
 from sniff.simulation.tap import CH340, FTDI, UART, TapModel
 from tests.faults.case import Case, Said
 from tests.faults.workbench import N2, Modbus, by_turns, follower, usual_requests, usual_stations
@@ -45,12 +48,30 @@ def _case(name: str, bus: Modbus | N2, tap: TapModel | None = None) -> Case:
     return made() if tap is None else made(tap=tap)
 
 
+_SELDOM = Modbus(
+    tuple(read_holding(unit, start, 1) for unit in (40, 80, 126) for start in (0, 3)),
+    usual_stations((40, 80, 126), unit_40=12 * MS, unit_80=8 * MS, unit_126=30 * MS),
+    (LateResponse(0.06, 318 * MS, ("unit 80",)),),
+    line=LineSettings.parse("9600,8N2"),
+    timeout=317 * MS,
+    retries=0,
+    pause=10 * MS,
+)
+"""Most of what is sent comes within three times the master's patience of one of so many late answers."""
+
 LATE_CASES: tuple[Case, ...] = (
     _case("RTU answers into the next station, no repeats", _bus(240, retries=0)),
     _case("N2 answers into the next station", _n2(250, 15)),
 )
 
 FURTHER_LATE_CASES: tuple[Case, ...] = (
+    Case(
+        "RTU now and then answers into the next request, FTDI",
+        _SELDOM,
+        (Said(("station 80",), ("MB106",)),),
+        FTDI,
+        never=("LN203", "MB203"),
+    ),
     _case("RTU answers into its own repeat", _bus(205, pause=5)),
     _case("RTU answers into the next station", _bus(232)),
     Case("N2 answers into the next station, FTDI", _n2(225, 30), _late_or_unasked, FTDI, seeds=1, struck=("bus",)),
