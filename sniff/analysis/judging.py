@@ -19,7 +19,7 @@ from sniff.analysis.judgement import Judgement
 from sniff.analysis.line_rules import LINE_RULES
 from sniff.analysis.profile_rules import PROFILE_RULES
 from sniff.analysis.site_rules import SITE_RULES
-from sniff.engine.engine import Output
+from sniff.engine.engine import Output, Row
 from sniff.engine.session import LineEvent, LineEventKind, Session, settings_change
 
 if TYPE_CHECKING:
@@ -41,13 +41,13 @@ class LineJudging:
 
     def add(self, output: Output) -> None:
         """Take rows and closed transactions."""
-        for row in output.rows:
-            if row.searched is None:
+        for row, closed in output.in_order():
+            if row is not None and row.searched is None:
                 self.findings.see(row)
-            else:  # a request may be among it whose answer comes next
+            elif row is not None:  # a request may be among it whose answer comes next
                 self.findings.pass_by(row)
-        for transaction in output.transactions:
-            self.findings.settle(transaction)
+            for transaction in closed:
+                self.findings.settle(transaction)
 
     def add_table(self, table: Table) -> None:
         """Take many rows: the same as one after the other."""
@@ -106,27 +106,34 @@ class Judging:
 
     def _add(self, output: Output) -> None:
         """All but what is the line's."""
-        judge, devices = self.judge, self.devices
-        for row in output.rows:
-            if row.searched is not None:
-                self._hole, self._first_after = row.event.end, None
-                continue
-            if self._hole is not None and self._first_after is None and row.event.end >= self._hole:
-                self._first_after = row.no
-                if judge is not None:  # something was there that nobody heard: no silence
-                    gap = Noise(b"", row.event.start, row.event.start, Place.BETWEEN, Reason.NO_FRAME)
-                    judge.see(row.no, gap, None, None)
-            if judge is not None:
-                judge.see(row.no, row.event, row.header, row.placement)
-            if devices is not None:
-                devices.see(row.no, row.event, row.header, row.placement)
-        for transaction in output.transactions:
-            if self._is_torn(transaction):
-                continue
-            if judge is not None:
-                judge.settle(transaction)
-            if devices is not None:
-                devices.settle(transaction)
+        for row, closed in output.in_order():
+            if row is not None:
+                self._see(row)
+            for transaction in closed:
+                self._settle(transaction)
+
+    def _see(self, row: Row) -> None:
+        judge = self.judge
+        if row.searched is not None:
+            self._hole, self._first_after = row.event.end, None
+            return
+        if self._hole is not None and self._first_after is None and row.event.end >= self._hole:
+            self._first_after = row.no
+            if judge is not None:  # something was there that nobody heard: no silence
+                gap = Noise(b"", row.event.start, row.event.start, Place.BETWEEN, Reason.NO_FRAME)
+                judge.see(row.no, gap, None, None)
+        if judge is not None:
+            judge.see(row.no, row.event, row.header, row.placement)
+        if self.devices is not None:
+            self.devices.see(row.no, row.event, row.header, row.placement)
+
+    def _settle(self, transaction: Transaction) -> None:
+        if self._is_torn(transaction):
+            return
+        if self.judge is not None:
+            self.judge.settle(transaction)
+        if self.devices is not None:
+            self.devices.settle(transaction)
 
     def add_table(self, table: Table) -> None:
         """Take many rows: the same as one after the other."""

@@ -5,7 +5,7 @@ Pure: no I/O, no clock. One engine is one bus. What it gives is numbered from 1 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from dissectors.frame import Chunk, Event, Frame, Header
@@ -48,6 +48,17 @@ class Output:
 
     def __bool__(self) -> bool:
         return bool(self.rows or self.transactions)
+
+    def in_order(self) -> Iterator[tuple[Row | None, tuple[Transaction, ...]]]:
+        """Each row with the transactions that it closed; those that no row closed come last, with None."""
+        at = 0
+        for place, row in enumerate(self.rows):
+            begin = at
+            while at < len(self.closed_by) and self.closed_by[at] <= place:
+                at += 1
+            yield row, self.transactions[begin:at]
+        if at < len(self.transactions):
+            yield None, self.transactions[at:]
 
 
 NOTHING = Output()
