@@ -187,7 +187,8 @@ class MstpRingObserver(TokenWatch):
         if frame_type == _TOKEN:
             if not answers:
                 self._take_turn(no, frame, source, node, header)
-            self._pass_token(no, frame, source, destination, node)
+            if destination <= MAX_MASTER:  # else nobody can take it: its sender still has it
+                self._pass_token(no, frame, source, destination, node)
         elif frame_type == _POLL:
             if not answers:
                 self._take_turn(no, frame, source, node, header)

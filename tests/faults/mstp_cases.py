@@ -5,19 +5,20 @@ from __future__ import annotations
 from functools import partial
 
 from dissectors.bacnet.application import WRITE_PROPERTY, Application, Outgoing, confirmed
-from dissectors.bacnet.envelope import npdu_frame
+from dissectors.bacnet.envelope import frame, npdu_frame
 from dissectors.bacnet.frame_types import EXPECTING, FrameType
 from dissectors.bacnet.simulated import Faults, SimulatedNode
 from dissectors.frame import Place
 from dissectors.line import Timing
 from dissectors.simulated import Station
 from dissectors.simulated_faults import EarlyRelease, NoiseInGaps
-from sniff.simulation.tap import FTDI
+from sniff.simulation.tap import CH340, FTDI
 from tests.faults.buses import MSTP_LINE, mstp
 from tests.faults.case import Case, Said
 from tests.faults.hearing import unheard
 from tests.faults.misbehaving import Blinks, Trimmed, When
 from tests.faults.ring_nodes import (
+    AlsoSends,
     AnswersTests,
     Dawdles,
     FailsFor,
@@ -120,6 +121,7 @@ def _is_request(octets: bytes) -> bool:
 
 
 _far = {"max_master": 127}
+_token_beyond = frame(FrameType.TOKEN, 200, 9)
 
 MSTP_CASES: tuple[Case, ...] = (
     # tokens
@@ -230,6 +232,33 @@ MSTP_CASES: tuple[Case, ...] = (
         struck=("MAC 9",),
         never=("MS406",),
         seconds=30,
+        seeds=1,
+    ),
+    Case(
+        "MS/TP token to a forbidden address in the first search",
+        Ring(
+            (
+                Member(3, partial(controller, 9), settings=_far),
+                Member(5, partial(controller, 9), settings=_far),
+                Member(9, partial(drive, 9), partial(AlsoSends, line=MSTP_LINE, every=40, extra=_token_beyond), _far),
+                Member(66, partial(drive, 66), settings=_far),
+            )
+        ),
+        (("MS404", "MAC 9"),),
+        also=("MS404",),
+        never=("MS106", "MS406"),
+        seconds=5,
+        seeds=1,
+    ),
+    Case(
+        "MS/TP token to a forbidden address, CH340",
+        Ring(
+            (_one, _two, _five, _with(_nine, change=partial(AlsoSends, line=MSTP_LINE, every=40, extra=_token_beyond)))
+        ),
+        (("MS404", "MAC 9"),),
+        CH340,
+        also=("MS404",),
+        never=("MS106", "MS406"),
         seeds=1,
     ),
     # what this tap alone does not hear
