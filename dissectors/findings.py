@@ -251,7 +251,24 @@ def with_consequences(findings: Iterable[Finding], rules: Mapping[str, Rule]) ->
         for other, finding in enumerate(made):
             if other != at and finding.cause is None and codes and _is_explained(finding, cause, codes):
                 made[other] = as_consequence(finding, cause, rules)
-    return _told_once(made, rules)
+    return from_the_root(_told_once(made, rules), rules)
+
+
+def from_the_root(findings: Iterable[Finding], rules: Mapping[str, Rule]) -> tuple[Finding, ...]:
+    """The same findings; one whose cause turned out to be a consequence itself comes of what that one comes of."""
+    made = tuple(findings)
+    by_key = {one.key: one for one in made}
+    return tuple(_from_the_root(one, by_key, rules) for one in made)
+
+
+def _from_the_root(finding: Finding, by_key: Mapping[tuple[str, str], Finding], rules: Mapping[str, Rule]) -> Finding:
+    passed = {finding.key}
+    cause = by_key.get(finding.cause) if finding.cause is not None else None
+    while cause is not None and cause.cause is not None and cause.key not in passed:
+        passed.add(cause.key)
+        cause = by_key.get(cause.cause)
+    is_further = cause is not None and cause.key not in passed and cause.key != finding.cause
+    return as_consequence(finding, cause, rules) if cause is not None and is_further else finding
 
 
 def _told_once(findings: list[Finding], rules: Mapping[str, Rule]) -> tuple[Finding, ...]:

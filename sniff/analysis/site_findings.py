@@ -13,7 +13,7 @@ from itertools import combinations, permutations
 import numpy as np
 
 from dissectors.columns import Masks, Times
-from dissectors.findings import Finding, as_consequence, counted, found
+from dissectors.findings import Finding, as_consequence, counted, found, from_the_root
 from dissectors.line import MS, NS_PER_S
 from dissectors.subject import About, Subject
 from dissectors.words import milliseconds
@@ -71,7 +71,8 @@ def judged(buses: Sequence[SiteBus]) -> SiteJudgement:
     for front, back in permutations(buses, 2):
         made += _forwarded(front, back)
     order = sorted(made, key=lambda one: (-one.severity, one.code, one.first))
-    return SiteJudgement(_merged(order), tuple(tuple(own) for own in told))
+    site = _merged(order)
+    return SiteJudgement(site, tuple(from_the_root((*own, *site), RULES)[: len(own)] for own in told))
 
 
 def _merged(findings: Sequence[Finding]) -> tuple[Finding, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dissectors.findings import Finding, Rule, Severity, counted, times, with_consequences
+from dissectors.findings import Finding, Rule, Severity, counted, from_the_root, times, under_causes, with_consequences
 
 RULES = {
     "XX1": Rule("XX1", Severity.ERROR, "two senders", "", explains=("XX2", "YY")),
@@ -68,6 +68,25 @@ def test_a_consequence_names_its_cause_and_explains_nothing_itself() -> None:
     }
     made = with_consequences([finding("A", "bus", Severity.ERROR), finding("B", "bus"), finding("C", "bus")], rules)
     assert [one.cause for one in made] == [None, ("A", "bus"), None]
+
+
+def test_what_a_consequence_had_explained_before_comes_of_the_same_cause() -> None:
+    rules = {
+        "A": Rule("A", Severity.WARNING, "a", "", explains=("B",)),
+        "B": Rule("B", Severity.WARNING, "b", "", explains=("C",), told_by=("D",)),
+        "C": Rule("C", Severity.WARNING, "c", ""),
+        "D": Rule("D", Severity.WARNING, "d", ""),
+    }
+    for root in ("A", "D"):
+        made = with_consequences([finding("B", "bus"), finding("C", "bus"), finding(root, "bus")], rules)
+        assert [one.cause for one in made] == [(root, "bus"), (root, "bus"), None], root
+        assert made[1].next.startswith(f"settle {root} first")
+        assert [(one.code, under) for one, under in under_causes(made)] == [(root, False), ("B", True), ("C", True)]
+
+
+def test_causes_that_name_each_other_end() -> None:
+    rings = [replace(finding(code, "bus"), cause=(other, "bus")) for code, other in ("XY", "YZ", "ZX")]
+    assert from_the_root(rings, RULES) == tuple(rings)
 
 
 def test_a_note_explains_nothing() -> None:

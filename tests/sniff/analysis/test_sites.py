@@ -71,6 +71,15 @@ def test_what_a_site_explains_stands_under_it(name: str) -> None:
         assert all(one.severity < Severity.WARNING for one in own)
 
 
+def test_what_had_been_explained_by_what_a_site_explains_stands_under_the_site() -> None:
+    """All stations of a bus are lost at once: that explains each of them there, and the site explains that."""
+    site = judge(SITES["stations-lost"][0](random.Random(7)))
+    for own in site.buses:
+        consequences = {one.key for one in own if one.cause is not None}
+        assert consequences
+        assert not consequences & {one.cause for one in own}
+
+
 @pytest.mark.parametrize("name", ["one-bus-stops", "two-stops"])
 def test_what_it_does_not_explain_stays_what_it_is(name: str) -> None:
     site = judge(SITES[name][0](random.Random(7)))
