@@ -18,7 +18,7 @@ from sniff.analysis.judging import rules_over
 from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.site_rules import SITE_RULES
 from sniff.analysis.wording import station_word
-from sniff.bus.row_words import iso
+from sniff.bus.row_words import iso, since_start
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 
@@ -179,7 +179,7 @@ def evidence(one: Checked, finding: Finding) -> str:
     shown = []
     for no in finding.evidence[:EVIDENCE_SHOWN]:
         start = one.start(no)
-        at = f" at {(start - one.session.started) / NS_PER_S:.3f} s" if start is not None else ""
+        at = f" at {since_start(start, one.session) / NS_PER_S:.3f} s" if start is not None else ""
         shown.append(f"{no}{at}")
     more = " …" if len(finding.evidence) > EVIDENCE_SHOWN or finding.count > len(finding.evidence) else ""
     return f"{'rows:' if len(shown) > 1 else 'row:':<7}{', '.join(shown)}{more}"
@@ -236,7 +236,7 @@ def write_json(checked: Sequence[Checked]) -> None:
 
 def to_json(one: Checked, finding: Finding) -> dict[str, object]:
     """One finding; times both as ISO 8601 and as ns since the capture's start, null where nobody knows them."""
-    started, has_times = one.session.started, one.session.has_times
+    session, has_times = one.session, one.session.has_times
     return {
         "source": one.source,
         "code": finding.code,
@@ -246,10 +246,10 @@ def to_json(one: Checked, finding: Finding) -> dict[str, object]:
         "count": finding.count,
         "first": iso(finding.first) if has_times else None,
         "last": iso(finding.last) if has_times else None,
-        "first_ns": finding.first - started if has_times else None,
-        "last_ns": finding.last - started if has_times else None,
+        "first_ns": since_start(finding.first, session) if has_times else None,
+        "last_ns": since_start(finding.last, session) if has_times else None,
         "frames": [
-            {"no": no, "start_ns": None if (start := one.start(no)) is None else start - started}
+            {"no": no, "start_ns": None if (start := one.start(no)) is None else since_start(start, session)}
             for no in finding.evidence
         ],
         "seen": finding.seen,

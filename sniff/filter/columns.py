@@ -171,12 +171,21 @@ _NO_WORDS = (None,)
 _REMEMBERED = 64
 
 
-def _begins(table: Table, started: int) -> Columns:
-    """When rows began, ns after `started`."""
+def _begins(table: Table) -> Columns:
+    """When rows began, ns."""
     bounds: tuple[int, int] | None = getattr(table, "begins", None)
     if bounds is None:
-        return (Numbers(table.frames.start - started),)
-    return (Bounded(lambda: table.frames.start - started, len(table), bounds[0] - started, bounds[1] - started),)
+        return (Numbers(table.frames.start),)
+    return (Bounded(lambda: table.frames.start, len(table), *bounds),)
+
+
+def _begins_since(table: Table, started: int) -> Columns:
+    """When rows began, ns after the capture's start, at least 0."""
+    bounds: tuple[int, int] | None = getattr(table, "begins", None)
+    if bounds is None:
+        return (Numbers(np.maximum(table.frames.start - started, 0)),)
+    least, most = (max(0, bound - started) for bound in bounds)
+    return (Bounded(lambda: np.maximum(table.frames.start - started, 0), len(table), least, most),)
 
 
 def _zeros(table: Table) -> Numbers:
@@ -200,7 +209,7 @@ _OF_TABLES: Mapping[str, Callable[[Table], Columns]] = {
             lambda: table.first + np.arange(len(table)), len(table), table.first, table.first + max(0, len(table) - 1)
         ),
     ),
-    "frame.time": lambda table: _begins(table, 0),
+    "frame.time": _begins,
     "src": lambda table: (_optional(table.shown("source")),),
     "dst": lambda table: (_optional(table.shown("destination")),),
     "addr": lambda table: (_optional(table.shown("source")), _optional(table.shown("destination"))),
@@ -238,7 +247,7 @@ def held(name: str, started: int) -> ColumnsOf | None:
     if of_closing is not None:
         return lambda table, closed: None if closed is None else of_closing(closed)
     if name == "frame.time_relative":
-        return lambda table, closed: _begins(table, started)
+        return lambda table, closed: _begins_since(table, started)
     if name in ("start_ns", "end_ns"):
         end = name[:-3]
         return lambda table, closed: (Numbers(np.maximum(getattr(table.frames, end) - started, 0)),)

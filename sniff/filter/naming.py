@@ -107,7 +107,7 @@ class Names:
             end = name[:-3]
             get = lambda row, _: (max(0, getattr(row.event, end) - started),)  # noqa: E731  one of several
         elif name == "frame.time_relative":
-            get = lambda row, _: (row.event.start - started,)  # noqa: E731
+            get = lambda row, _: (max(0, row.event.start - started),)  # noqa: E731
         elif name == "frame.time_delta":
             begins = self.begins = self.begins or Begins(self.scope.begin_of)
             get, columns = delta(begins)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from dissectors.findings import Finding, Severity, under_causes
-from dissectors.line import MS
+from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.token_ring import TokenRing
@@ -191,7 +191,7 @@ def _score(health: Health) -> Score:
 def _parts(timeline: Timeline, session: Session) -> tuple[TimePart, ...]:
     if timeline.origin is None:
         return ()
-    begin = seconds_since(session.started, timeline.origin)
+    begin = (timeline.origin - session.started) / NS_PER_S  # parts begin at round times, the first before the start
     width = timeline.width / 1e9
     return tuple(
         TimePart(

@@ -218,5 +218,5 @@ class CaptureNumbers:
 
 
 def seconds_since(start: int, time: int) -> float:
-    """ns on the capture's clock as seconds since its start."""
-    return (time - start) / NS_PER_S
+    """ns on the capture's clock as seconds since its start, at least 0, as every command counts."""
+    return max(0, time - start) / NS_PER_S

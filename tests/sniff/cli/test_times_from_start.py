@@ -30,6 +30,30 @@ def test_the_first_read_began_before_its_stamp(foreign: Path, sniff485: Callable
     assert "-0." not in sniff485("show", foreign).out
 
 
+def test_all_who_tell_when_a_row_began_count_alike(tmp_path: Path, sniff485: Callable) -> None:
+    """A row that began before the start: `show`, filters, `check` and the page."""
+    path = tmp_path / "a.cap.txt"
+    text = "#!sniff-capture 1\n# line: 19200,8E1\n# protocol: modbus-rtu\n# start: 2026-03-01T10:00:00Z\n"
+    path.write_text(text + "+0 01 03 00 00 00 02 C4 0B\n+500 01 03 00 00 00 02 C4 0B\n" * 4)
+    rows = {row["no"]: row["start_ns"] for row in map(json.loads, sniff485("show", path, "--json").out.splitlines())}
+    assert rows[1] == 0 < rows[2]
+    found = [json.loads(line) for line in sniff485("check", path, "--json").out.splitlines()]
+    told = [frame for finding in found for frame in finding["frames"]]
+    assert 1 in {frame["no"] for frame in told}
+    assert all(frame["start_ns"] == rows[frame["no"]] for frame in told)
+    assert all(0 <= finding["first_ns"] <= finding["last_ns"] for finding in found)
+    assert "row" in (words := sniff485("check", path).out) and "-0." not in words
+    for finding in json.loads(sniff485("report", path, "--json").out)["findings"]:
+        assert all(row["at"] == rows[row["no"]] / 1e9 for row in finding["evidence"])
+        assert 0 <= finding["first"] <= finding["last"]
+    assert sniff485("show", path, "-T", "fields", "-e", "frame.time_relative", "-c", "1").out == "0\n"
+    for how in ((), ("--reference",)):
+        for test in ("frame.time_relative == 0 s", "start_ns == 0"):
+            shown = sniff485("show", path, "-Y", test, "-T", "fields", "-e", "no", *how).out
+            assert shown.splitlines() == ["1"], (test, how)
+        assert len(sniff485("show", path, "-Y", "frame.time_relative >= 0 s", *how).out.splitlines()) == len(rows)
+
+
 def test_between_the_ends_of_what_a_file_can_say(tmp_path: Path, sniff485: Callable) -> None:
     """584 years, twice what int64 holds in ns: as text and as JSON, many rows at a time as one by one."""
     path = tmp_path / "a.mcap"
