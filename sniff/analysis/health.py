@@ -118,10 +118,9 @@ def station_health(node: Node, findings: Iterable[Finding] = (), beyond: _Beyond
     """Health of one station, with the findings about it; None where it was never asked and sent nothing."""
     if not node.seen:
         return None
-    asked, frames = node.asked, node.sent + node.received
-    verdicts = node.verdicts
+    asked, verdicts = node.asked, node.verdicts
     answers = beyond.answers * _share(verdicts[Verdict.DAMAGED_ANSWER], asked)
-    of_frames = beyond.frames * _share(node.damaged, frames)
+    of_frames = beyond.frames * _share(node.damaged, node.weighed)
     again = verdicts[Verdict.LATE] + verdicts[Verdict.ANSWERED_TWICE] + verdicts[Verdict.RETRY]
     return _sum(
         findings,

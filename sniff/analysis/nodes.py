@@ -30,6 +30,7 @@ class Node:
     address: int
     sent: int = 0  # frames from it
     received: int = 0  # frames to it
+    anonymous: int = 0  # of those, the ones of unknown sender: of a master where frames do not name it
     damaged: int = 0
     heard: int = 0  # good frames from it, or put right: a damaged frame may name a station that there is not
     first: int | None = None
@@ -43,8 +44,9 @@ class Node:
 
     @property
     def seen(self) -> bool:
-        """Whether there is a sign of it but being polled for: it sent a good frame, was asked, or given a token."""
-        return bool(self.heard or self.asked or self.unused)
+        """Whether there is a sign of it but being polled for: it sent a good frame, was asked or given a token, or
+        what came in its answer to a poll was damaged."""
+        return bool(self.heard or self.asked or self.unused or self.errors)
 
     @property
     def asked(self) -> int:
@@ -53,6 +55,11 @@ class Node:
             return 0
         late = min(self.verdicts[Verdict.LATE], self.verdicts[Verdict.NO_RESPONSE])
         return sum(self.verdicts[verdict] for verdict in EXPECTING) - late
+
+    @property
+    def weighed(self) -> int:
+        """Frames among which `damaged` counts: its own, and those to it that nobody else's name is on."""
+        return self.sent + self.anonymous
 
     @property
     def answered(self) -> int:
@@ -72,6 +79,7 @@ class Node:
             self.address,
             self.sent + other.sent,
             self.received + other.received,
+            self.anonymous + other.anonymous,
             self.damaged + other.damaged,
             self.heard + other.heard,
             min(times, default=None),
@@ -130,6 +138,7 @@ class NodeTable:
             node = self._node(address)
             node.sent += sends
             node.received += not sends
+            node.anonymous += not sends and source is None
             node.damaged += not row.event.ok and (sends or source is None)
             node.heard += sends and (row.event.ok or row.event.repair is not None)
             node.first = row.event.start if node.first is None else node.first
@@ -172,10 +181,12 @@ class NodeTable:
             held = addresses[rows]
             damaged = ~good[rows] if sends else ~good[rows] & anonymous[rows]
             counts, bad, heard = (np.bincount(of).tolist() for of in (held, held[damaged], held[whole[rows]]))
+            unnamed = [] if sends else np.bincount(held[anonymous[rows]]).tolist()
             for address, first in _first_places(held, counts):
                 node = self._node(address)
                 node.sent += counts[address] * sends
                 node.received += counts[address] * (not sends)
+                node.anonymous += unnamed[address] if address < len(unnamed) else 0
                 node.damaged += bad[address] if address < len(bad) else 0
                 node.heard += heard[address] if sends and address < len(heard) else 0
                 seen.setdefault(address, []).append(int(rows[first]))

@@ -55,6 +55,17 @@ def test_each_deduction_of_a_station(made: Node, score: int, reason: str) -> Non
     assert health.reasons == (reason,)
 
 
+def test_damaged_frames_are_a_share_of_those_that_could_be_its_own() -> None:
+    """What other stations sent to it is theirs, also where it is damaged."""
+    made = Node(31, sent=40, received=40, damaged=4, heard=36)
+    health = station_health(made)
+    assert health is not None
+    assert health.reasons == ("10% of its frames damaged (−30)",)
+    of_a_master = station_health(Node(1, sent=40, received=40, anonymous=40, damaged=4, heard=40))
+    assert of_a_master is not None
+    assert of_a_master.reasons == ("5.0% of its frames damaged (−15)",)
+
+
 def test_a_station_that_was_never_asked_and_sent_nothing_has_none() -> None:
     assert station_health(Node(7)) is None
 

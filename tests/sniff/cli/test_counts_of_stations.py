@@ -61,3 +61,20 @@ def test_nodes_polls_and_report_count_alike(name: str, late: Path, sniff485: Cal
         assert [sum(poll[name] for poll in mine) for name in ("answered", "exceptions", "no answer")] == counts
         station = told[node["address"]]
         assert [station[name] for name in ("answered", "exceptions", "unanswered")] == counts
+
+
+def test_who_answers_polls_with_damaged_frames_alone_is_a_station(sniff485: Callable[..., Ran]) -> None:
+    """`check` finds something of it, so it was heard: every list of stations has it, with all its frames damaged."""
+    path = CAPTURES / "findings" / "ms-tp-last-two-octets-missing.cap.txt"
+    assert "MAC 31" in {one["subject"] for one in _objects(sniff485("check", path, "--json", "--fail-on", "never"))}
+    (node,) = [one for one in _objects(sniff485("stats", path, "nodes", "--json")) if one["address"] == 31]
+    assert (node["frames from"], node["damaged"]) == (5, 5)
+    for how in ((), ("--reference",)):
+        (info,) = _objects(sniff485("info", path, "--json", *how))
+        assert 31 in {one["address"] for one in info["nodes"]}
+        assert info["polled_only"] == []
+        health = {one["subject"]: one for one in _objects(sniff485("stats", path, "health", "--json", *how))}["MAC 31"]
+        assert "100% of its frames damaged" in health["why"]
+    latency = _objects(sniff485("stats", path, "latency", "--json"))
+    nodes = _objects(sniff485("stats", path, "nodes", "--json"))
+    assert {one["address"] for one in latency} <= {one["address"] for one in nodes}

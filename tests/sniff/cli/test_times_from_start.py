@@ -42,7 +42,7 @@ def test_all_who_tell_when_a_row_began_count_alike(tmp_path: Path, sniff485: Cal
     assert 1 in {frame["no"] for frame in told}
     assert all(frame["start_ns"] == rows[frame["no"]] for frame in told)
     assert all(0 <= finding["first_ns"] <= finding["last_ns"] for finding in found)
-    assert "row" in (words := sniff485("check", path).out) and "-0." not in words
+    assert "-0." not in sniff485("check", path).out
     for finding in json.loads(sniff485("report", path, "--json").out)["findings"]:
         assert all(row["at"] == rows[row["no"]] / 1e9 for row in finding["evidence"])
         assert 0 <= finding["first"] <= finding["last"]
