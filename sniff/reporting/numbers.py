@@ -121,7 +121,7 @@ class TimePart:
 class Happening:
     """Something that happened to the line, in words."""
 
-    at: float
+    at: float | None
     kind: str
     text: str
     count: int
@@ -181,7 +181,7 @@ class CaptureNumbers:
     completeness: str
     first: str | None
     last: str | None
-    seconds: float
+    seconds: float | None
     octets: int
     noise_octets: int
     frames: int
@@ -208,9 +208,9 @@ class CaptureNumbers:
             replace(one, first=None, last=None, evidence=tuple(replace(row, at=None) for row in one.evidence))
             for one in self.findings
         )
-        return replace(
-            self, first=None, last=None, seconds=0.0, load=None, findings=findings, part=0.0, timeline=(), values=()
-        )
+        happenings = tuple(replace(one, at=None) for one in self.happenings)
+        told = replace(self, findings=findings, happenings=happenings)
+        return replace(told, first=None, last=None, seconds=None, load=None, part=0.0, timeline=(), values=())
 
     def to_json(self) -> dict[str, Any]:
         """Plain values, keys in the order of the fields; the keys are a promise."""

@@ -115,8 +115,8 @@ def _percent(share: float) -> str:
 
 
 def _seconds(value: float | None) -> str:
-    """Seconds since the start. A first frame that began before its read, which is when the capture starts, is at 0."""
-    return "" if value is None else f"{0.0 if -0.5 < value < 0 else value:.3f} s"
+    """Seconds since the start."""
+    return "" if value is None else f"{value:.3f} s"
 
 
 def _span(seconds: float) -> str:

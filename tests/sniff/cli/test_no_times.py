@@ -13,6 +13,10 @@ from pathlib import Path
 import pytest
 
 import sniff
+from dissectors.frame import Chunk
+from sniff.engine.session import LineEvent, LineEventKind
+from sniff.formats import read
+from sniff.recording.writer import Recorder
 from tests.sniff.cli.conftest import Ran
 
 CLEAN = Path(__file__).parents[3] / "captures"
@@ -82,6 +86,23 @@ def test_info_has_no_span_and_no_load(log: Path, sniff485: Run) -> None:
     assert not re.search(r"load|p50|1970", said)
     told = json.loads(sniff485("info", "--json", log).out)
     assert {told[name] for name in ("first", "last", "seconds", "load", "response_ms")} == {None}
+
+
+def test_the_page_has_no_span(log: Path, sniff485: Run) -> None:
+    told = json.loads(sniff485("report", "--json", log).out)
+    assert {told[name] for name in ("first", "last", "seconds", "load")} == {None}
+
+
+def test_what_happened_to_the_line_has_no_instant(log: Path, tmp_path: Path, sniff485: Run) -> None:
+    capture = read(log)
+    recorder = Recorder(tmp_path / "dropped.mcap", capture.session)
+    for item in capture.items():
+        if isinstance(item, Chunk):
+            recorder.chunk(item)
+    recorder.line(LineEvent(item.time, LineEventKind.DROPPED, count=3))
+    recorder.close()
+    (happening,) = json.loads(sniff485("report", "--json", tmp_path / "dropped.mcap").out)["happenings"]
+    assert (happening["at"], happening["count"]) == (None, 3)
 
 
 def test_load_is_refused(log: Path, sniff485: Run) -> None:
