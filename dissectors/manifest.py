@@ -7,7 +7,7 @@ manifest and nobody else. Only what every bus needs has no default; a plain prot
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -112,6 +112,7 @@ class Dissector:
     text: Callable[[Frame, Header, Role], str]
     fields: Callable[[Frame, Role], dict[str, int | float | str]]
     packet: Callable[[Frame, Role], Any]
+    _: KW_ONLY  # many, mostly of one type: by place one would pass for another
     meant: Callable[[Frame, Header, Role, Meaning], str] | None = None
     place: PlaceName = plain_place
     spans: Spans | None = None

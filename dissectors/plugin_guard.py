@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from dissectors.frame import Frame, Header, Role
 
@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from dissectors.manifest import Dissector
     from dissectors.meaning import Meaning
     from dissectors.simulated import SimulatedBus
+
+_Given = TypeVar("_Given")
 
 LONGEST = 120
 """Characters of an error that are shown."""
@@ -23,8 +25,21 @@ class FailedHeader(Header):
     __slots__ = ()
 
 
+def _of_type(given: Any, wanted: type[_Given]) -> _Given:
+    if not isinstance(given, wanted):
+        raise TypeError(f"it gave {type(given).__name__}, no {wanted.__name__}")
+    return given
+
+
+def _of_values(given: Any) -> dict[str, int | float | str]:
+    for name, value in _of_type(given, dict).items():
+        if not isinstance(name, str) or not isinstance(value, int | float | str):
+            raise TypeError(f"{name!r} is {type(value).__name__}, no number and no text")
+    return dict(given)
+
+
 def guarded(dissector: Dissector) -> Dissector:
-    """The same protocol, whose `peek`, `text`, `fields` and `packet` never raise."""
+    """The same protocol, whose `peek`, `text`, `fields` and `packet` never raise and give what they should."""
 
     def failed(function: str, error: Exception) -> str:
         said = "".join(c if c.isprintable() else "." for c in str(error))[:LONGEST]
@@ -32,7 +47,7 @@ def guarded(dissector: Dissector) -> Dissector:
 
     def peek(frame: Frame) -> Header:
         try:
-            return dissector.peek(frame)
+            return _of_type(dissector.peek(frame), Header)
         except Exception as error:
             words = failed("peek", error)
             return FailedHeader(dissector.name, None, None, Role.UNKNOWN, "unknown", ok=frame.ok, error=words)
@@ -41,19 +56,19 @@ def guarded(dissector: Dissector) -> Dissector:
         if isinstance(header, FailedHeader):
             return header.error or ""
         try:
-            return dissector.text(frame, header, role)
+            return _of_type(dissector.text(frame, header, role), str)
         except Exception as error:
             return failed("text", error)
 
     def meant(frame: Frame, header: Header, role: Role, meaning: Meaning) -> str:
         try:
-            return replace(dissector, text=text).line(frame, header, role, meaning)
+            return _of_type(replace(dissector, text=text).line(frame, header, role, meaning), str)
         except Exception as error:
             return failed("meant", error)
 
     def fields(frame: Frame, role: Role) -> dict[str, int | float | str]:
         try:
-            return dissector.fields(frame, role)
+            return _of_values(dissector.fields(frame, role))
         except Exception as error:
             return {f"{dissector.name}.error": failed("fields", error)}
 

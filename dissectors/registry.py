@@ -1,7 +1,8 @@
 """The protocols: built-in ones and those that other packages bring (entry points, group `sniff485.dissectors`).
 
 A new protocol is one folder and one line in BUILT_IN. Nothing is imported before it is asked for. What a plug-in's
-functions raise is shown at the frame it was about (`plugin_guard.py`).
+functions raise is shown at the frame it was about (`plugin_guard.py`); where there is no such frame the command ends
+and names the plug-in (`plugin_at`).
 """
 
 from __future__ import annotations
@@ -123,10 +124,14 @@ _guarded: dict[str, tuple[Dissector, Dissector]] = {}
 """Name of a plug-in → what it brought, and the same with its functions guarded."""
 
 
+def _named(point: EntryPoint) -> str:
+    package = f" of package {point.dist.name}" if point.dist is not None else ""
+    return f"plug-in {point.name!r}{package}"
+
+
 def _plugged(point: EntryPoint) -> Dissector:
     """The protocol of another package. Raises BrokenPlugin."""
-    package = f" of package {point.dist.name}" if point.dist is not None else ""
-    where = f"plug-in {point.name!r}{package}"
+    where = _named(point)
     from dissectors.manifest import Dissector
     from dissectors.plugin_guard import guarded
 
@@ -140,3 +145,13 @@ def _plugged(point: EntryPoint) -> Dissector:
     if known is None or known[0] is not found:
         known = _guarded[point.name] = (found, guarded(found))
     return known[1]
+
+
+def plugin_at(file: str) -> str | None:
+    """The plug-in whose code a file holds, as messages name it; None where it is nobody's."""
+    for point in _plugged_points():
+        module = sys.modules.get(point.value.partition(":")[0].partition(".")[0])
+        folders = tuple(f"{folder}{slash}" for folder in getattr(module, "__path__", ()) for slash in "/\\")
+        if file == getattr(module, "__file__", None) or file.startswith(folders):
+            return _named(point)
+    return None

@@ -129,15 +129,16 @@ def _failed(error: Exception, traced: bool) -> int:
 
         with contextlib.suppress(OSError, ValueError):
             traceback.print_exception(error)
-    what = f"{type(error).__name__}: {error}"
+    what, (place, plugin) = f"{type(error).__name__}: {error}", _place(error)
+    whose, whom = ("internal error", "") if plugin is None else (f"{plugin} failed", " to whoever made it")
     standard_streams.say(
-        f"internal error: {_plain(what)} ({_place(error)}); please report it, with what {TRACEBACK} says"
+        f"{whose}: {_plain(what)} ({_plain(place)}); please report it{whom}, with what {TRACEBACK} says"
     )
     return INTERNAL
 
 
-def _place(error: Exception) -> str:
-    """Where it happened: file and line of the innermost frame of our own."""
+def _place(error: Exception) -> tuple[str, str | None]:
+    """Where it happened: file and line of the innermost frame of our own or of a plug-in, and which plug-in that is."""
     import traceback
 
     elsewhere = getattr(error, "places_elsewhere", ())  # in the process that read a capture (bus/reading_process.py)
@@ -145,9 +146,16 @@ def _place(error: Exception) -> str:
         *traceback.extract_tb(error.__traceback__),
         *(traceback.FrameSummary(file, line, "") for file, line in elsewhere),
     ]
-    ours = [frame for frame in frames if any(f"{os.sep}{name}{os.sep}" in frame.filename for name in _OURS)]
-    frame = (ours or frames)[-1]
-    return f"{os.path.basename(os.path.dirname(frame.filename))}/{os.path.basename(frame.filename)}:{frame.lineno}"
+    frame, plugin = frames[-1], None
+    for known in reversed(frames):
+        plugin = registry.plugin_at(known.filename)
+        if plugin is not None or any(f"{os.sep}{name}{os.sep}" in known.filename for name in _OURS):
+            frame = known
+            break
+    return (
+        f"{os.path.basename(os.path.dirname(frame.filename))}/{os.path.basename(frame.filename)}:{frame.lineno}",
+        plugin,
+    )
 
 
 def _run(arguments: list[str]) -> int:

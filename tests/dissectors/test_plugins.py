@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +13,7 @@ from typing import Any
 import pytest
 
 from dissectors import registry
+from dissectors.manifest import Dissector
 from sniff.cli import main
 from sniff.simulation import scenarios
 
@@ -73,6 +76,45 @@ def test_a_function_that_raises_is_said_at_its_row(plug: Callable[..., None], sh
     assert code == 0
     assert function == "fields" or f"{function} of plug-in 'half' failed" in out
     assert show("check", "-p", "half")[0] == 0
+
+
+@pytest.mark.parametrize("function", ["peek", "text", "fields"])
+@pytest.mark.parametrize("given", [None, 3, {"half.x": object()}])
+def test_what_is_no_such_thing_is_said_at_its_row(
+    plug: Callable[..., None], show: Command, function: str, given: Any
+) -> None:
+    rtu = registry.get("modbus-rtu")
+    plug("half", lambda: replace(rtu, name="half", **{function: lambda *_: given}))
+    for how in (("--json", "--fields"), ("-V",), ("-Y", "modbus.func_code == 3 || ok"), ()):
+        assert show("show", "-p", "half", *how)[0] == 0, how
+    assert f"{function} of plug-in 'half' failed: TypeError: " in show("show", "-p", "half", "--json", "--fields")[1]
+
+
+@pytest.mark.parametrize("function", ["framer", "tracker", "judge"])
+def test_where_no_row_can_say_it_the_command_names_the_plug_in(
+    plug: Callable[..., None], show: Command, function: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is no defect of this program, so that nobody reports it here."""
+    (tmp_path / "package_half.py").write_text("def fails(*_):\n    raise ValueError('it broke')\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    module = importlib.import_module("package_half")
+    monkeypatch.setitem(sys.modules, "package_half", module)
+    rtu = registry.get("modbus-rtu")
+    plain = dict.fromkeys(("kernel", "pairing", "reading_columns", "stencil"))
+    plug("half", lambda: replace(rtu, name="half", **plain, **{function: module.fails}))
+    code, _, err = show("check", "-p", "half")
+    assert code == 70
+    assert "sniff485: plug-in 'half' of package package-half failed: ValueError: it broke (" in err
+    assert "/package_half.py:2); please report it to whoever made it" in err
+
+
+def test_optional_parts_go_by_their_names() -> None:
+    """Many take one and the same type: by place one would pass for another."""
+    rtu = registry.get("modbus-rtu")
+    needed = (rtu.name, rtu.title, rtu.framer, rtu.peek, rtu.tracker, rtu.text, rtu.fields, rtu.packet)
+    assert Dissector(*needed, default_line="9600,7E1").default_line == "9600,7E1"
+    with pytest.raises(TypeError, match="positional"):
+        Dissector(*needed, "9600,7E1")  # type: ignore[misc]
 
 
 def test_a_packet_that_fails_is_raw(plug: Callable[..., None], show: Command) -> None:

@@ -163,7 +163,7 @@ def scenarios() -> Mapping[str, SimulatedBus]:
 
 
 GONG = Dissector(
-    "gong", "Gong", framer, peek, Polling, text, fields, packet, "9600,7E1",
+    "gong", "Gong", framer, peek, Polling, text, fields, packet, default_line="9600,7E1",
     noun="bell", bits=lambda frame: 4.0 * len(frame.octets), readings=readings, renamer=GongRenamer,
     makers={"gong": seal}, scenarios=scenarios,
 )  # fmt: skip
