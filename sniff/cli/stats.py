@@ -101,10 +101,9 @@ def _of_captures(args: argparse.Namespace, table: str, opened: Sequence[tuple[st
     if table in ("ring", "stations"):
         shown = dissector_for(session).ring
         if shown is None:
-            passing = ", ".join(one.name for one in registry.usable() if one.ring is not None)
-            raise Failure(f"{table}: {session.protocol} passes no token; this table is for {passing}", USAGE)
+            raise Failure(f"{table}: {session.protocol} passes no token; {_for_whom(table)}", USAGE)
         if table == "stations" and shown.stations is None:
-            raise Failure(f"stations: {session.protocol} has masters only; see nodes and ring", USAGE)
+            raise Failure(f"stations: {_for_whom(table)}; of {session.protocol} see nodes and ring", USAGE)
         from sniff.cli import ring
 
         if table == "stations" and shown.stations is not None:
@@ -181,6 +180,12 @@ def _listen(args: argparse.Namespace, port: str, table: str) -> int:
     return watching.follow(live, watching.Listener(), show, args.style, take)
 
 
+def _for_whom(table: str) -> str:
+    rings = {one.name: one.ring for one in registry.usable() if one.ring is not None}
+    names = [name for name, ring in rings.items() if table == "ring" or ring.stations is not None]
+    return f"this table is for {', '.join(names)}"
+
+
 def _show_ring(model: BusModel, table: str, style: str) -> None:
     from sniff.cli import ring
 
@@ -192,7 +197,7 @@ def _show_ring(model: BusModel, table: str, style: str) -> None:
     elif shown.stations is not None:
         tables.write(shown.stations.headings, shown.stations.rows(model.ring()), style)
     else:
-        print(f"{model.session.protocol} has masters only", file=sys.stdout if style == "text" else sys.stderr)
+        print(_for_whom(table), file=sys.stdout if style == "text" else sys.stderr)
 
 
 NODE_HEADINGS = (

@@ -61,3 +61,20 @@ def test_a_recording_is_named_as_any_other_file_that_is_written(
     ran = sniff485("record", "/dev/null", "-s", "9600,8N1", "-p", "n2", option, tmp_path / "x.txt")
     assert ".mcap" in ran.err
     assert ran.code == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "table", "protocols"),
+    [
+        ("rtu-clean", "ring", {"mstp", "profibus"}),
+        ("rtu-clean", "stations", {"profibus"}),
+        ("mstp-clean", "stations", {"profibus"}),
+    ],
+)
+def test_a_table_that_is_not_for_a_protocol_names_those_it_is_for(
+    name: str, table: str, protocols: set[str], sniff485: Callable[..., Ran]
+) -> None:
+    ran = sniff485("stats", CLEAN.with_name(f"{name}.cap.txt"), table)
+    assert (ran.code, ran.out) == (2, "")
+    told = ran.err.partition("this table is for ")[2].partition(";")[0]
+    assert set(told.strip().split(", ")) == protocols
