@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from dissectors import registry
 from dissectors.field_types import FieldType, Kind
@@ -28,12 +28,19 @@ MOST_WORDS = 12
 
 
 class FieldCells:
-    """Cells of `-T fields` for names that only filters know: a row's values, with commas between several."""
+    """Cells of `-T fields` for names that only filters know: a row's values, with commas between several. `findings`:
+    codes by the numbers of the rows that show them, where those are asked for."""
 
-    def __init__(self, names: Iterable[str], session: Session, devices: Devices) -> None:
+    def __init__(
+        self,
+        names: Iterable[str],
+        session: Session,
+        devices: Devices,
+        findings: Mapping[int, frozenset[str]] | None = None,
+    ) -> None:
         self._begins: dict[int, int] = {}
         self._has_times = session.has_times
-        scope = Scope(session.started, devices, begin_of=self._begins.get)
+        scope = Scope(session.started, devices, begin_of=self._begins.get, findings=findings)
         self._expressions = {
             name: field_of(name, dissector_for(session), scope) for name in names if is_of_filters(name)
         }
@@ -96,6 +103,8 @@ def check_names(names: Iterable[str]) -> None:
     for name in names:
         if name in JSON_KEYS or name in COLUMN_TYPES or name in ALIASES:
             continue
+        if name in POINT_TYPES:
+            raise Failure(f"-e {name}: a row may have many; it is for filters (-Y), and `points` lists values", USAGE)
         silent = tuple(prefix for one in registry.usable() if not types_of(one) for prefix in one.prefixes)
         known = [field for one in registry.usable() for field in types_of(one)]
         if name not in known and not (silent and name.startswith(silent)):

@@ -111,7 +111,7 @@ def _compiled(text: str, capture: ReadSource, session: Session, scope: Scope) ->
     dissector = dissector_for(session)
     wanted = compile_filter(text, dissector, scope)
     if "finding" in wanted.names:
-        scope = replace(scope, findings=_evidence(capture, session, scope.devices))
+        scope = replace(scope, findings=evidence(capture, session, scope.devices))
     if wanted.points:
         from sniff.bus.asked_rows import points_told
 
@@ -177,7 +177,7 @@ def shown_findings(
     return shown(capture, session, filter_of(args, capture, session, devices), findings)
 
 
-def _evidence(capture: ReadSource, session: Session, devices: Devices) -> dict[int, frozenset[str]]:
+def evidence(capture: ReadSource, session: Session, devices: Devices) -> dict[int, frozenset[str]]:
     """Codes of the findings that each row is evidence of."""
     from sniff.analysis.judging import Judging
 

@@ -95,7 +95,7 @@ def _show_all(args: argparse.Namespace, opened: Sequence[tuple[str, Capture]], t
             args.tree or args.fields or _by_request(args.names, session)
         )  # then every register is named, with a profile or without
         spoken = devices if named or (devices and (not args.table or "text" in args.names)) else None
-        ours = _cells_of_filters(args.names, session, devices)
+        ours = _cells_of_filters(args.names, capture, session, devices)
         listed = ListedRows(args, capture, session, proof, wanted, *(() if ours is None else (ours.noting,)))
         if args.reference or spoken or named or ours or args.hex or proof.name:
             left = _show(args, listed.all(spoken), session, ours, left, table, source)
@@ -114,13 +114,14 @@ def _is_text(args: argparse.Namespace) -> bool:
     return not (args.json or args.csv or args.table or args.parquet or args.explain)
 
 
-def _cells_of_filters(names: list[str], session: Session, devices: Devices) -> FieldCells | None:
+def _cells_of_filters(names: list[str], capture: Capture, session: Session, devices: Devices) -> FieldCells | None:
     """Of names that only filters know; None where there are none."""
     if all(name in rows.JSON_KEYS for name in names):
         return None
     from sniff.cli.field_names import FieldCells
 
-    return FieldCells(names, session, devices) or None
+    findings = filtering.evidence(capture, session, devices) if "finding" in names else None
+    return FieldCells(names, session, devices, findings) or None
 
 
 def _by_request(names: list[str], session: Session) -> bool:

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+CAPTURES = Path(__file__).parents[3] / "captures"
+
 KEYS = [
     "no", "t", "start_ns", "end_ns", "proto", "src", "dst", "role", "kind", "ok", "error", "found", "noise_before",
     "tx", "verdict", "latency_ms", "text", "hex",
@@ -245,3 +247,23 @@ def test_a_question_names_what_its_answer_tells(name: str, sniff485: Callable) -
     assert all(one["title"] for one in asked["asks"])
     assert (asked["values"], told["asks"]) == ([], [])
     assert len(told["values"]) in (len(asked["asks"]), len(asked["asks"]) - 1)  # one property the drive does not have
+
+
+@pytest.mark.parametrize("more", [(), ("--reference",)])
+def test_a_row_names_the_findings_that_it_shows(more: tuple[str, ...], sniff485: Callable) -> None:
+    path = CAPTURES / "rtu-usual-faults.cap.txt"
+    found = [json.loads(line) for line in sniff485("check", path, "--json").out.splitlines()]
+    told: dict[int, set[str]] = {}
+    for finding in found:
+        for frame in finding["frames"]:
+            told.setdefault(frame["no"], set()).add(finding["code"])
+    lines = sniff485("show", path, "-T", "fields", "-e", "no", "-e", "finding", *more).out.splitlines()
+    cells = {int(no): set(codes.split(",")) for no, _, codes in (line.partition("\t") for line in lines) if codes}
+    assert cells == told
+
+
+def test_what_only_filters_have_is_no_unknown_field(sniff485: Callable) -> None:
+    ran = sniff485("show", CAPTURES / "rtu-clean.cap.txt", "-T", "fields", "-e", "point")
+    assert ran.code == 2
+    assert "unknown" not in ran.err
+    assert "-Y" in ran.err
