@@ -21,7 +21,7 @@ from sniff.cli import arguments, filtering, json_output
 from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.session import Adapter, LineEvent, Session, settings_change
+from sniff.engine.session import LINE_NOTE, Adapter, LineEvent, Session, settings_change
 
 if TYPE_CHECKING:
     from sniff.engine.table import Table
@@ -247,7 +247,8 @@ def _settings(session: Session) -> str:
     title = "unknown" if "protocol" in session.unknown else dissector_for(session).title
     if "line" in session.unknown:
         return f"{title}, line settings unknown"
-    return f"{title}, {session.line}{' (assumed)' if session.line_is_assumed else ''}"
+    told = "assumed" if session.line_is_assumed else sanitized(session.notes.get(LINE_NOTE, ""))
+    return f"{title}, {session.line}{f' ({told})' if told else ''}"
 
 
 def _search(session: Session, summary: Summary, events: list[LineEvent]) -> str:

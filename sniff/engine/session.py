@@ -50,7 +50,9 @@ LINELESS = frozenset(("pty", "TCP gateway"))
 
 LINE_NOTE = "line"
 ASSUMED = "assumed: the file does not say"
-"""Note of a session whose format keeps no line settings: `line` is what such a bus normally runs."""
+"""Note of a session whose format keeps no line settings: `line` is what such a bus normally runs. Another text says
+where `line` is from.
+"""
 
 PROTOCOL_NOTE = "protocol"
 """Note of a session whose file does not say its protocol: ASSUMED, or how it was told from the octets."""
@@ -364,7 +366,7 @@ def with_settings(session: Session, protocol: str | None = None, line: LineSetti
     A line that is only assumed becomes that of the protocol said. Raises registry.UnknownProtocol where it must know.
     """
     if line is not None:
-        notes = {name: text for name, text in session.notes.items() if name != LINE_NOTE or text != ASSUMED}
+        notes = {name: text for name, text in session.notes.items() if name != LINE_NOTE}
         session = replace(session, notes=notes)
     elif protocol is not None and session.line_is_assumed:
         session = replace(session, line=LineSettings.parse(registry.get(protocol).default_line))

@@ -17,6 +17,7 @@ import numpy as np
 
 from dissectors.line import NS_PER_S, LineSettings
 from sniff.formats.uart import FRAMING, Characters, Decoder, Uart
+from sniff.formats.usual_rates import USUAL
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -25,11 +26,6 @@ if TYPE_CHECKING:
 
 SAMPLE = 20_000
 """Edges that are looked at."""
-USUAL = (
-    *(300, 600, 1200, 1800, 2400, 4800, 7200, 9600, 14400, 19200, 28800, 31250, 38400, 45450, 56000, 57600, 76800),
-    *(93750, 115200, 128000, 153600, 187500, 230400, 250000, 256000, 460800, 500000, 750000, 921600, 1_000_000),
-    *(1_500_000, 2_000_000, 3_000_000, 4_000_000, 6_000_000, 8_000_000, 10_000_000),
-)
 LEAST_CHARACTERS = 4
 GOOD_LEAST = 0.8
 """Share of characters and edges that are where they belong, below which a channel holds no characters."""
