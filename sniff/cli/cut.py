@@ -38,6 +38,8 @@ def run(args: argparse.Namespace) -> int:
         raise Failure("say what to keep: --from and --to, or --frames, or --around", USAGE)
     capture = arguments.open_capture(args.file)
     session = arguments.settings_of(args, capture.session, args.file)
+    if (args.since or args.until or args.margin) and not session.has_times:
+        raise Failure(f"{args.file} does not say when anything came; choose by --frames, --around or -Y", USAGE)
     watched = Watched(capture)
     try:
         if args.frames:

@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
         findings = filtering.shown_findings(args, capture, session, model.findings(), model.devices)
         line = "" if session.line_is_assumed else str(session.line)
         title = dissector_for(session).title
-        sides.append(Side(path, summary, findings, session.adapter.latency, points, title, line))
+        sides.append(Side(path, summary, findings, session.adapter.latency, points, title, line, session.has_times))
     found = list(differences(*sides))
     rows = [(one.subject, one.what, one.before, one.after) for one in found]
     if rows or args.style != "text":

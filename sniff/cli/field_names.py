@@ -39,8 +39,9 @@ class FieldCells:
         findings: Mapping[int, frozenset[str]] | None = None,
     ) -> None:
         self._begins: dict[int, int] = {}
-        self._has_times = session.has_times
-        scope = Scope(session.started, devices, begin_of=self._begins.get, findings=findings)
+        scope = Scope(
+            session.started, devices, begin_of=self._begins.get, findings=findings, has_times=session.has_times
+        )
         self._expressions = {
             name: field_of(name, dissector_for(session), scope) for name in names if is_of_filters(name)
         }
@@ -65,14 +66,8 @@ class FieldCells:
 
     def cell(self, name: str, row: Row, transaction: Transaction | None) -> str:
         """What a row has of a name."""
-        if not self._has_times and ALIASES.get(name, name) in _OF_TIME:
-            return ""
         field = self._expressions[name]
         return ",".join(_cell(value, field.type) for value in field.get(row, transaction))
-
-
-_OF_TIME = frozenset(("frame.time", "frame.time_relative", "frame.time_delta"))
-"""Names that a capture without times knows nothing of."""
 
 
 def is_of_filters(name: str) -> bool:

@@ -52,11 +52,13 @@ def filter_of_both(
     proof = SecondProof(session)
     if not args.filter and not getattr(args, "explain", False):
         return proof, None
-    from sniff.filter import FilterError, Scope, compile_filter
-    from sniff.filter.errors import OfOthers
+    from sniff.filter import FilterError, compile_filter
+    from sniff.filter.errors import OfOthers, OfTimes
 
     try:
-        compile_filter(args.filter, dissector_for(session), Scope(session.started, devices or Devices()))
+        compile_filter(args.filter, dissector_for(session), _scope(session, devices))
+    except OfTimes:
+        pass  # said below
     except OfOthers:
         from sniff.bus.second_protocol import proven
 
@@ -73,11 +75,11 @@ def filter_of(
 ) -> Filter:
     """What -Y says, for a capture; ends with exit code 2 where it cannot be read, or asks for what frames of this
     protocol cannot have. Of several captures, one at least must have it."""
-    from sniff.filter import FilterError, Scope, compile_filter
+    from sniff.filter import FilterError, compile_filter
     from sniff.filter.errors import OfOthers
 
     dissector = dissector_for(session)
-    scope = Scope(session.started, devices or Devices())
+    scope = _scope(session, devices)
     try:
         return _compiled(args.filter, capture, session, scope)
     except OfOthers as error:
@@ -94,14 +96,20 @@ def filter_of(
 
 def of_second(args: argparse.Namespace, session: Session, name: str) -> Filter | None:
     """What -Y says of frames of a second protocol on the bus; None where it asks for what they cannot have."""
-    from sniff.filter import FilterError, Scope, compile_filter
+    from sniff.filter import FilterError, compile_filter
 
     if not registry.is_of_lines(name):
         return None
     try:
-        return compile_filter(args.filter, registry.get(name), Scope(session.started, Devices()))
+        return compile_filter(args.filter, registry.get(name), _scope(session))
     except FilterError:
         return None
+
+
+def _scope(session: Session, devices: Devices | None = None) -> Scope:
+    from sniff.filter import Scope
+
+    return Scope(session.started, devices or Devices(), has_times=session.has_times)
 
 
 def _compiled(text: str, capture: ReadSource, session: Session, scope: Scope) -> Filter:

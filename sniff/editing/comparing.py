@@ -25,7 +25,7 @@ class Side:
     """One capture: what was counted and found in it. `latency`: ns that its adapter may hold octets back.
 
     `points`: the values of its stations, as `PointTable` gives them. `protocol`: its title; `line`: its settings; empty
-    where nobody knows them.
+    where nobody knows them. `has_times`: whether it says when anything came.
     """
 
     name: str
@@ -35,6 +35,7 @@ class Side:
     points: tuple[Point, ...] = ()
     protocol: str = ""
     line: str = ""
+    has_times: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +68,11 @@ def _bus(before: Side, after: Side) -> Iterator[Difference]:
     for name, was, now in (("protocol", before.protocol, after.protocol), ("line settings", before.line, after.line)):
         if was and now and was != now:
             yield Difference("bus", name, was, now)
+    loads = (
+        ((before.counts.load.overall(), after.counts.load.overall()),) if before.has_times and after.has_times else ()
+    )
     shares = (
-        ("load", before.counts.load.overall(), after.counts.load.overall()),
+        *(("load", *both) for both in loads),
         ("damaged frames", _share(before.counts.damaged, before.counts.frames),
          _share(after.counts.damaged, after.counts.frames)),
         ("noise octets", _share(before.counts.noise, before.counts.octets),

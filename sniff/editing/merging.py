@@ -17,7 +17,12 @@ if TYPE_CHECKING:
 
 
 def merged_session(captures: Sequence[Capture], names: Sequence[str]) -> Session:
-    """The session of all together: the earliest start, the worst adapter. Raises CaptureError where they differ."""
+    """The session of all together: the earliest start, the worst adapter. Raises CaptureError where they differ, and
+    where one does not say when anything came: what stands at the same place in two logs is not the same read.
+    """
+    timeless = [name for capture, name in zip(captures, names, strict=True) if not capture.session.has_times]
+    if timeless and len(captures) > 1:
+        raise CaptureError(f"{timeless[0]} does not say when anything came; captures are merged by time")
     first = next((capture.session for capture in captures if not capture.session.unknown), captures[0].session)
     for capture, name in zip(captures[1:], names[1:], strict=True):
         other = capture.session

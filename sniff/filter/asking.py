@@ -88,7 +88,7 @@ def nowhere(table: Table, closed: Closed | None) -> Any:
 
     from sniff.filter.columns import Numbers
 
-    return (Numbers(np.zeros(len(table), np.int8), np.zeros(len(table), bool)),)
+    return (Numbers(np.zeros(len(table), np.int64), np.zeros(len(table), bool)),)
 
 
 def delta(begins: Begins) -> tuple[fields.Getter, ColumnsOf]:

@@ -19,6 +19,10 @@ class OfOthers(FilterError):
     """A filter that frames of this protocol can never fit, since it asks for what only others have."""
 
 
+class OfTimes(OfOthers):
+    """The same of a capture that does not say when anything came, since it asks for that."""
+
+
 def nearest(word: str, known: Iterable[str], most: int = 8) -> str:
     """ "did you mean 'late'?", or which there are."""
     names = list(dict.fromkeys(known))

@@ -26,6 +26,14 @@ OF_CLOSING = frozenset(
 )
 """What became of a row, which may become known later than the row."""
 
+OF_TIME = frozenset(
+    (
+        *("frame.time", "frame.time_relative", "frame.time_delta", "start_ns", "end_ns"),
+        *("latency_ms", "tx.latency_low_ms", "tx.latency_high_ms"),
+    )
+)
+"""What only a capture has that says when anything came."""
+
 ALIASES = {
     "frame.number": "no",
     "frame.len": "len",

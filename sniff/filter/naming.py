@@ -12,7 +12,7 @@ from sniff.engine.engine import Row
 from sniff.filter import fields, told
 from sniff.filter.asking import delta, leaf, nowhere
 from sniff.filter.comparing import With
-from sniff.filter.errors import FilterError, OfOthers, nearest
+from sniff.filter.errors import FilterError, OfOthers, OfTimes, nearest
 from sniff.filter.expressions import Expression
 from sniff.filter.literals import number_of
 from sniff.filter.plan import Begins, Leaf, TestNode, joined
@@ -22,10 +22,11 @@ from sniff.filter.syntax import Quoted, Value, Word
 
 @dataclass(frozen=True, slots=True)
 class Elsewhere:
-    """A name or a word that only other protocols have. `column`: where it stands."""
+    """A name or a word that only other protocols have, or (`of_time`) captures with times. `column`: its place."""
 
     words: str
     column: int
+    of_time: bool = False
 
 
 class Names:
@@ -95,6 +96,11 @@ class Names:
 
         if type.never:
             self.elsewhere.append(Elsewhere(f"frames of {self.dissector.title} have no {name}", column))
+            return Expression(name, type, lambda row, tx: (), nowhere, nowhere=True, field=name)
+        if name in fields.OF_TIME and not self.scope.has_times:
+            self.elsewhere.append(
+                Elsewhere(f"{name}: this capture does not say when anything came", column, of_time=True)
+            )
             return Expression(name, type, lambda row, tx: (), nowhere, nowhere=True, field=name)
         started, closing = self.scope.started or 0, name in fields.OF_CLOSING
         columns = held(name, started)
@@ -197,9 +203,11 @@ class Names:
         return f"these frames are {self.dissector.title}"
 
     def of_others(self) -> OfOthers | None:
-        """The first of what only other protocols have, as an error."""
+        """The first of what only other protocols or captures have, as an error."""
         first = min(self.elsewhere, key=lambda one: one.column, default=None)
-        return None if first is None else OfOthers(first.words, first.column)
+        if first is None:
+            return None
+        return (OfTimes if first.of_time else OfOthers)(first.words, first.column)
 
     def unknown(self, name: str) -> str:
         """That there is no such name, and which is nearest."""

@@ -30,7 +30,7 @@ class Scope:
     come in order. `told`: the values of points that a row carries, by its number; None where nobody knows them.
     `telling`: which of so many rows from a number on carry any; None where that is not known beforehand. `says`: the
     line that says what a row is, where that knows more than the row. `answered`: fields of an answer that only its
-    request tells.
+    request tells. `has_times`: whether the capture says when anything came.
     """
 
     started: int | None = None
@@ -42,6 +42,7 @@ class Scope:
     telling: Callable[[int, int], Masks] | None = None
     says: Callable[[Row], str] | None = None
     answered: Callable[[Row], Mapping[str, int | float | str]] | None = None
+    has_times: bool = True
 
     def stations(self) -> dict[str, tuple[int, ...]]:
         """Addresses by name."""

@@ -17,7 +17,7 @@ from sniff.engine.session import LineEvent, LineEventKind
 from sniff.filter import Filter, FilterError, Scope, compile_filter
 from sniff.filter.compiling import field_of
 from sniff.filter.completion import shown_value
-from sniff.filter.errors import OfOthers
+from sniff.filter.errors import OfOthers, OfTimes
 from sniff.filter.told import told
 from sniff.tui.times import TimeMode
 
@@ -97,7 +97,7 @@ class Viewing:
         try:
             return compile_filter(text, self.store.dissector, self._scope(text), others)
         except OfOthers as error:
-            if self.foreign is None:
+            if self.foreign is None or isinstance(error, OfTimes):
                 raise
             first, second = self.store.dissector.title, self.foreign.second.title
             said = f"filters here ask frames of {first}; `sniff485 show -Y` asks those of {second} too"
@@ -142,6 +142,7 @@ class Viewing:
             told=lambda no: [told(value) for value in store.told(no)],
             says=store.text,
             answered=store.answered,
+            has_times=store.session.has_times,
         )
 
     def _begin_of(self, no: int) -> int | None:

@@ -57,6 +57,48 @@ def test_fields_of_time_are_empty(log: Path, sniff485: Run) -> None:
     assert [line.split("\t") for line in out.splitlines()] == [[str(no), "", "", "", "", ""] for no in range(1, 17)]
 
 
+TIMED = (
+    *("frame.time < '2020-01-01'", 't > "10:02"', "frame.time_delta < 5ms", "frame.time_relative", "start_ns >= 0"),
+    *("latency_ms > 5ms", "!(latency_ms > 5ms)", "tx.latency_high_ms > 1", "frame.time_delta + 1s > 2s"),
+)
+
+
+@pytest.mark.parametrize("wanted", TIMED)
+def test_filters_of_time_are_refused(wanted: str, log: Path, sniff485: Run) -> None:
+    for command in (("show",), ("show", "--reference"), ("info",), ("check",), ("points",)):
+        ran = sniff485(*command, log, "-Y", wanted.replace("'", '"'))
+        assert (ran.code, ran.out) == (2, "")
+        assert "does not say when anything came" in ran.err
+
+
+def test_a_filter_that_asks_for_more_than_times_holds(log: Path, sniff485: Run) -> None:
+    for wanted in ("latency_ms > 5ms || dst == 1", 'dst == 1 && !(frame.time > "10:02")'):
+        assert len(sniff485("show", log, "-Y", wanted).out.splitlines()) == 8
+
+
+def test_a_filter_of_time_for_several_captures(log: Path, sniff485: Run) -> None:
+    ran = sniff485("show", "--json", log, CLEAN / "rtu-clean.cap.txt", "-Y", "latency_ms >= 0ms")
+    assert ran.code == 0
+    assert "latency_ms: this capture does not say when anything came" in ran.err
+    assert {json.loads(line)["source"] for line in ran.out.splitlines()} == {str(CLEAN / "rtu-clean.cap.txt")}
+
+
+def test_neither_stretches_nor_merging_go_by_time(log: Path, tmp_path: Path, sniff485: Run) -> None:
+    made = tmp_path / "made.mcap"
+    for times in (("--from", "+0.1"), ("--to", "+0.1"), ("--frames", "1-2", "--margin", "1s")):
+        ran = sniff485("cut", log, "-o", made, *times)
+        assert ran.code == 2
+        assert "does not say when anything came" in ran.err
+    assert sniff485("cut", log, "-o", made, "--frames", "1-2").code == 0
+    ran = sniff485("merge", log, made, "-o", tmp_path / "merged.mcap")
+    assert ran.code == 3
+    assert "does not say when anything came; captures are merged by time" in ran.err
+
+
+def test_loads_are_not_compared(log: Path, sniff485: Run) -> None:
+    assert "load" not in sniff485("diff", log, CLEAN / "rtu-clean.cap.txt").out
+
+
 def test_two_taps_are_not_compared(log: Path, sniff485: Run) -> None:
     ran = sniff485("taps", log, log)
     assert (ran.code, ran.out) == (2, "")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from sniff.engine.session import LineEvent, LineEventKind
+from sniff.bus.rows import Store
+from sniff.engine.session import NO_TIMES, LineEvent, LineEventKind
 from sniff.filter import FilterError
 from sniff.tui.view_state import Viewing
 
@@ -21,6 +23,17 @@ def test_freeze_stops_the_view_and_counts(busy_bus: Any) -> None:
     assert viewing.came_since == 3
     viewing.freeze(False)
     assert (viewing.last_row, viewing.last_closed, viewing.came_since) == (16, 7, 0)
+
+
+def test_a_filter_of_time_where_nothing_has_any(busy_bus: Any) -> None:
+    known = busy_bus.store.session
+    timeless = replace(known, adapter=replace(known.adapter, latency_from=NO_TIMES))
+    store = Store(timeless, busy_bus.store.dissector)
+    viewing = Viewing(store)
+    with pytest.raises(FilterError, match="does not say when anything came"):
+        viewing.set_filter('frame.time > "10:02"')
+    viewing.colour_rules({"red": "latency_ms > 5ms"})  # a saved one is for other captures, too
+    assert viewing.colour_of(busy_bus.store.by_no(1), None) == ""
 
 
 def test_marks_go_round(busy_bus: Any) -> None:
