@@ -258,7 +258,11 @@ def open_buses(path: str) -> list[tuple[str, Capture]]:
     """Open the buses of a file by name, each as a capture of its own; ends as `open_capture` does."""
     capture = _opened(path)
     buses = buses_in(capture, path)
-    return [(path, capture)] if len(buses) < 2 else [(f"{path} [{one.session.bus}]", one) for one in buses]
+    if len(buses) < 2:
+        return [(path, capture)]
+    for one in buses:
+        one.session = _as_it_tells(one.session)
+    return [(f"{path} [{one.session.bus}]", one) for one in buses]
 
 
 def open_captures(paths: Sequence[str]) -> list[tuple[str, Capture]]:

@@ -28,11 +28,11 @@ class Fresh(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Day:
-    """One day of a bus in numbers. Times are ns, shares 0 … 1."""
+    """One day of a bus in numbers. Times are ns, shares 0 … 1; `load`: None where nobody knows."""
 
     day: str
     health: Health
-    load: float
+    load: float | None
     frames: int
     octets: int
     damaged: float

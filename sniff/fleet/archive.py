@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from glob import glob, has_magic
 from pathlib import Path
 
+from sniff.analysis.told_protocol import detected
 from sniff.engine.capture import Capture, CaptureError
 from sniff.formats import read
 from sniff.formats.files import open_capture
@@ -155,7 +156,7 @@ def look(file: FileState) -> tuple[Begin, ...] | str:
         capture = read(file.path)
     except CaptureError as error:
         return _why(error, file)
-    buses = [unmarked(bus)[0] for bus in buses_in(capture)]
+    buses = [_told(unmarked(bus)[0]) for bus in buses_in(capture)]
     return tuple(
         Begin(bus.session.bus if len(buses) > 1 else None, bus.session.protocol, _part(bus), _recording(bus, file))
         for bus in buses
@@ -196,7 +197,13 @@ def opened(task: Task) -> list[Capture]:
 
 def _bus_of(task: Task, capture: Capture) -> Capture:
     """The bus that a task is about."""
-    return next(unmarked(bus)[0] for bus in buses_in(capture) if task.bus in (None, bus.session.bus))
+    return next(_told(unmarked(bus)[0]) for bus in buses_in(capture) if task.bus in (None, bus.session.bus))
+
+
+def _told(bus: Capture) -> Capture:
+    """The bus, of which its octets say what its file does not."""
+    bus.session = detected(bus.session)
+    return bus
 
 
 def _why(error: CaptureError, file: FileState) -> str:

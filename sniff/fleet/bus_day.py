@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, reduce
+from pathlib import PurePath
 
 from dissectors import registry
 from dissectors.findings import Finding, Rule
@@ -36,8 +37,9 @@ class BusDay:
 
     `site`, `bus`, `port`, `protocol`: which; `day`: "2026-03-01". `summary`: counts, stations, response times; its load
     is only a total. `busy`: ns with octets on the line, `listened`: ns between first and last octet, of all captures
-    together. `latency`: ns that the slowest adapter may have held octets back. `sources`: the
-    files. `notes`: what was wrong with them, in words. `judged`: of each capture, in any order.
+    together that say when anything came; `first`, `last`: when that was. `latency`: ns that the slowest adapter may
+    have held octets back. `sources`: the files. `notes`: what was wrong with them, in words. `judged`: of each capture,
+    in any order.
     """
 
     site: str
@@ -68,9 +70,9 @@ class BusDay:
         return whole.findings(_rules(self.protocol))
 
     @property
-    def load(self) -> float:
-        """Bus load while somebody listened, 0 … 1."""
-        return min(1.0, self.busy / self.listened) if self.listened else 0.0
+    def load(self) -> float | None:
+        """Bus load while somebody listened, 0 … 1; None where nobody knows for how long."""
+        return min(1.0, self.busy / self.listened) if self.listened else None
 
     def health(self, findings: Iterable[Finding] | None = None) -> HealthReport:
         """How the bus and its stations fared. `findings`: this day's, where they are known already."""
@@ -78,17 +80,29 @@ class BusDay:
 
     @property
     def heard(self) -> Hashable:
-        """What only a copy has in common with it: when the first and the last octet came, to the ns, and how many."""
-        if self.day == NO_DATE or self.first is None:
+        """What only a copy has in common with it: when its last frame ended, to the microsecond, which is all that
+        some formats keep, and how many good ones there are. Octets that are no frame some do not keep; when a frame
+        began they tell by a rate that they may have lost.
+        """
+        good = self.summary.frames - self.summary.damaged
+        last = max((node.last for node in self.summary.nodes if node.last is not None), default=None)
+        if self.day == NO_DATE or self.first is None or last is None or not good:
             return self.sources
-        return self.first, self.last, self.summary.octets, self.summary.frames
+        return last // 1000, good
+
+    @property
+    def is_named_by_file(self) -> bool:
+        """Whether nobody named the bus, so that a copy under another name is another bus."""
+        return any(file_stem(path) == self.bus for path in self.sources)
 
     def and_copy(self, other: BusDay) -> BusDay:
         """It or its copy, counted once; the order does not matter."""
-        low, high = sorted((self, other), key=lambda one: one.sources)
+        low, high = sorted((self, other), key=lambda one: (one.is_named_by_file, -one.summary.octets, one.sources))
         if low.sources == high.sources:
             return low
-        note = f"{', '.join(low.sources)} and {', '.join(high.sources)} hold the same octets: counted once"
+        same = "octets" if low.summary.octets == high.summary.octets else "frames"
+        paths = sorted((", ".join(low.sources), ", ".join(high.sources)))
+        note = f"{' and '.join(paths)} hold the same {same}: counted once"
         return replace(low, notes=tuple(sorted({*self.notes, *other.notes, note})))
 
     def merge(self, other: BusDay) -> BusDay:
@@ -110,6 +124,11 @@ class BusDay:
             sources=tuple(sorted({*self.sources, *other.sources})),
             notes=tuple(sorted({*self.notes, *other.notes})),
         )
+
+
+def file_stem(path: str) -> str:
+    """What a bus is called that nobody named: by its file."""
+    return PurePath(path).name.split(".")[0]
 
 
 @cache
@@ -140,5 +159,15 @@ class Archive:
 
     @property
     def days(self) -> dict[Key, BusDay]:
-        """All bus-days, merged."""
-        return {key: reduce(BusDay.merge, parts.values()) for key, parts in self._parts.items()}
+        """All bus-days, merged; a copy by whose format the name of its bus was lost is counted where it belongs."""
+        kept = {key: dict(parts) for key, parts in self._parts.items()}
+        alike: dict[Hashable, list[BusDay]] = {}
+        for day in (day for parts in kept.values() for day in parts.values()):
+            alike.setdefault((day.site, day.protocol, day.day, day.heard), []).append(day)
+        for copies in alike.values():
+            whole = reduce(BusDay.and_copy, sorted(copies, key=lambda one: (one.is_named_by_file, one.sources)))
+            for lost in copies:
+                if lost.key != whole.key and lost.is_named_by_file:
+                    del kept[lost.key][lost.heard]
+                    kept[whole.key][whole.heard] = whole
+        return {key: reduce(BusDay.merge, parts.values()) for key, parts in kept.items() if parts}

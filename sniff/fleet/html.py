@@ -60,12 +60,13 @@ def _line(number: int, bus: Bus) -> Iterator[str]:
     codes = ", ".join(dict.fromkeys(one.finding.code for one in bus.troubles))
     if not codes:
         codes = f"none: {'; '.join(day.health.reasons)}" if day.health.score < WELL else "–"
+    load = "–" if day.load is None else f"{day.load:.0%}"
     name = _safe(bus.name)
     linked = f'<a href="#bus{number}">{name}</a>' if _is_told(bus) else name
     yield (
         f"<tr><td>{linked} <span class=grey>{_safe(bus.protocol)}</span>"
         f'<td class="n {_class(day.health.score)}">{day.health.score}<td>{_picture(bus)}'
-        f"<td class=n>{day.load:.0%}<td class=n>{day.damaged:.2%}<td class=n>{day.unanswered:.2%}"
+        f"<td class=n>{load}<td class=n>{day.damaged:.2%}<td class=n>{day.unanswered:.2%}"
         f"<td class=n>{late}<td>{_safe(codes)}</tr>"
     )
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
-from pathlib import PurePath
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table
 from sniff.fleet.archive import NS_PER_DAY, Task, Window
-from sniff.fleet.bus_day import NO_DATE, BusDay, Judged
+from sniff.fleet.bus_day import NO_DATE, BusDay, Judged, file_stem
 from sniff.fleet.pieces import stretches
 
 FAR = 1 << 62
@@ -57,6 +56,8 @@ def _read(task: Task, capture: Capture) -> Iterator[BusDay]:
     if not parts and (task.window is None or notes):
         parts = {_day(session.started): DayObservers(session)}
     for day, part in parts.items():
+        load = part.summary.load
+        first, last = (load.first, load.last) if session.has_times else (None, None)
         yield BusDay(
             task.site,
             _bus_name(session, sources[0]),
@@ -65,11 +66,11 @@ def _read(task: Task, capture: Capture) -> Iterator[BusDay]:
             day,
             str(session.line),
             _without_seconds(part.summary),
-            part.summary.load.total.busy,
-            max(0, (part.summary.load.last or 0) - (part.summary.load.first or 0)),
-            part.summary.load.first,
-            part.summary.load.last,
-            (Judged(part.summary.load.first or 0, sources[0], part.judging.judgement()),),
+            load.total.busy if session.has_times else 0,
+            max(0, (last or 0) - (first or 0)),
+            first,
+            last,
+            (Judged(load.first or 0, sources[0], part.judging.judgement()),),
             session.adapter.latency,
             sources,
             tuple(notes),
@@ -144,7 +145,7 @@ class ByDay:
 
 def _bus_name(session: Session, path: str) -> str:
     """What a bus is called: as its recording says, else by its port, else by its file."""
-    return session.bus if session.bus != NAMELESS else PurePath(session.port or path).name.split(".")[0] or NAMELESS
+    return session.bus if session.bus != NAMELESS else file_stem(session.port or path) or NAMELESS
 
 
 def _day(time: int) -> str:

@@ -105,7 +105,8 @@ def numbers(day: Day) -> str:
     """A day's figures in columns."""
     response = day.response.quantile(0.95)
     late = f"{response / 1e6:7.1f}" if response is not None else "      –"
-    return f"{day.load:5.0%}  {day.damaged:7.2%}  {day.unanswered:9.2%}  {late}"
+    load = f"{day.load:5.0%}" if day.load is not None else "    –"
+    return f"{load}  {day.damaged:7.2%}  {day.unanswered:9.2%}  {late}"
 
 
 def curve(bus: Bus, days: int = DAYS) -> str:

@@ -119,7 +119,7 @@ def _day(day: Day) -> dict[str, Any]:
         "day": day.day,
         "health": day.health.score,
         "reasons": list(day.health.reasons),
-        "load": round(day.load, 4),
+        "load": None if day.load is None else round(day.load, 4),
         "frames": day.frames,
         "octets": day.octets,
         "damaged": round(day.damaged, 6),
@@ -128,7 +128,7 @@ def _day(day: Day) -> dict[str, Any]:
         "response_p95_ms": p95,
         "response_max_ms": most,
         "stations": list(day.stations),
-        "listened_s": round(day.listened / 1e9, 3),
+        "listened_s": round(day.listened / 1e9, 3) if day.load is not None else None,
     }
 
 

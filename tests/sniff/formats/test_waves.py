@@ -186,6 +186,20 @@ def test_buses_that_talk_at_once_are_two(tmp_path: Path, capsys: pytest.CaptureF
     assert "--bus" in capsys.readouterr().err
 
 
+def test_each_of_two_buses_tells_its_protocol(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    made = read(Path(__file__).parents[3] / "captures" / "mstp-clean.cap.txt")
+    heard = [(chunk.time - made.session.started, chunk.octets) for chunk in made.items() if isinstance(chunk, Chunk)]
+    line = LineSettings.parse("38400,8N1")
+    ring = edges_of([(end - len(octets) * line.char, octets) for end, octets in heard], line)
+    asked, answers = _polls(40)
+    channels = {"north": (1, ring), "south": (1, edges_of(sorted([*asked, *answers]), RTU))}
+    path = as_sigrok(tmp_path / "made.sr", channels)
+    assert main(["show", str(path), "--json"]) == 0
+    rows = capsys.readouterr().out.splitlines()
+    assert sum('"proto": "mstp"' in row and '"ok": true' in row for row in rows) == len(heard)
+    assert sum('"proto": "modbus-rtu"' in row and '"ok": true' in row for row in rows) == 80
+
+
 def test_rates_that_differ_are_two_buses(tmp_path: Path) -> None:
     asked, answers = _polls(20)
     slow = LineSettings.parse("9600,8N1")
