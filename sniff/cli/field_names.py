@@ -96,7 +96,7 @@ def _cell(value: object, type: FieldType) -> str:
 def check_names(names: Iterable[str]) -> None:
     """Whether there are such fields; ends with exit code 2 where there is none."""
     for name in names:
-        if name in JSON_KEYS or name in COLUMN_TYPES or name in ALIASES:
+        if name == "source" or name in JSON_KEYS or name in COLUMN_TYPES or name in ALIASES:
             continue
         if name in POINT_TYPES:
             raise Failure(f"-e {name}: a row may have many; it is for filters (-Y), and `points` lists values", USAGE)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -72,6 +72,21 @@ def separated(count: int, delimiter: str, first: Sequence[str] = ()) -> Style:
 
     between = delimiter.encode()
     return Style(render, (b"".join(render(text) + between for text in first), *[between] * (count - 1)), b"\n")
+
+
+def chosen(names: Sequence[str], source: str) -> Style:
+    """The same of chosen names, with tabs between; `source`: what each line has where that is named."""
+    style = separated(len(names), "\t")
+    said = style.render(source)
+    before, held = [], b""
+    for at, name in enumerate(names):
+        held += b"\t" if at else b""
+        if name == "source":
+            held += said
+        else:
+            before.append(held)
+            held = b""
+    return replace(style, before=tuple(before), end=held + b"\n")
 
 
 def json_lines(names: Sequence[str], source: str | None = None) -> Style:

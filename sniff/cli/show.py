@@ -35,6 +35,10 @@ if TYPE_CHECKING:
     from sniff.filter import Filter
 
 
+SOURCE = "source"
+"""What `-e` calls the capture or bus that a row is of."""
+
+
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `show`."""
     arguments.add_files(parser)
@@ -53,7 +57,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
     filtering.add_help_fields(parser)
     parser.add_argument("--explain", action="store_true", help="say how -Y is carried out, and show nothing")
     style.add_argument("-T", dest="table", choices=["fields"], help="tab-separated fields, chosen by -e")
-    parser.add_argument("-e", dest="names", metavar="NAME", action="append", default=[], help="a field; repeatable")
+    parser.add_argument(
+        "-e",
+        dest="names",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="a field, or source: whose row it is; repeatable",
+    )
     parser.add_argument("-c", "--count", type=arguments.whole, metavar="N", help="stop after N frames shown")
 
 
@@ -83,6 +94,8 @@ def _show_all(args: argparse.Namespace, opened: Sequence[tuple[str, Capture]], t
     left = args.count
     for at, (path, capture) in enumerate(opened):
         source = path if are_several else None  # of several captures each row says of which it is
+        if args.table and not at and are_several and SOURCE not in args.names:
+            print(f"sniff485: rows of {len(opened)} captures; -e {SOURCE} says of which each is", file=sys.stderr)
         if source is not None and _is_text(args):
             print(f"\n{sanitized(source)}" if at else sanitized(source))
         session = arguments.settings_of(args, capture.session, path)
@@ -97,12 +110,13 @@ def _show_all(args: argparse.Namespace, opened: Sequence[tuple[str, Capture]], t
         spoken = devices if named or (devices and (not args.table or "text" in args.names)) else None
         ours = _cells_of_filters(args.names, capture, session, devices)
         listed = ListedRows(args, capture, session, proof, wanted, *(() if ours is None else (ours.noting,)))
-        if args.reference or spoken or named or ours or args.hex or proof.name:
-            left = _show(args, listed.all(spoken), session, ours, left, table, source)
+        only_source = bool(args.names) and all(name == SOURCE for name in args.names)
+        if args.reference or spoken or named or ours or args.hex or proof.name or only_source:
+            left = _show(args, listed.all(spoken), session, ours, left, table, source, path)
         else:
-            left = _show_in_bulk(args, capture, session, proof, wanted, left, table, source)
+            left = _show_in_bulk(args, capture, session, proof, wanted, left, table, source, path)
             if proof.name and left != 0:
-                left = _show(args, listed.of_both(spoken), session, ours, left, table, source)
+                left = _show(args, listed.of_both(spoken), session, ours, left, table, source, path)
         say_incomplete(path, capture)
         if left == 0:
             break
@@ -142,6 +156,7 @@ def _show(
     left: int | None,
     table: ParquetWriter | None,
     source: str | None,
+    path: str,
 ) -> int | None:
     colour = arguments.colour()
     usual = dissector_for(session)
@@ -155,7 +170,7 @@ def _show(
             values = rows.to_json(item, dissector, session).values()
             writer.writerow([plain_cell(value) for value in (*first, *values)])
         elif args.table:
-            writer.writerow(_cells(item, args.names, dissector, session, ours))
+            writer.writerow(_cells(item, args.names, dissector, session, ours, path))
         elif args.json:
             print(rows.json_line(item, dissector, session, args.fields, source))
         else:
@@ -179,9 +194,10 @@ def _show_in_bulk(
     left: int | None,
     table: ParquetWriter | None,
     source: str | None,
+    path: str,
 ) -> int | None:
     """The rows before the first that may be one of a second protocol."""
-    listed = _listed(args, dissector_for(session), session, table, source)
+    listed = _listed(args, dissector_for(session), session, table, source, path)
     for settled_rows in settled_columns(Watched(capture, prints=True), session, proof) if left != 0 else ():
         places, first = _chosen(settled_rows, wanted), settled_rows.table.first
         if proof.name:
@@ -212,6 +228,7 @@ def _listed(
     session: Session,
     table: ParquetWriter | None,
     source: str | None,
+    path: str,
 ) -> Callable[[SettledRows, Times], None]:
     """What lists rows at some places."""
     first = () if source is None else (source,)
@@ -227,12 +244,13 @@ def _listed(
         return added
     made: RowCells | RowLines
     if args.csv or args.table or args.json:
-        from sniff.cli.row_cells import RowCells, json_lines, separated
+        from sniff.cli.row_cells import RowCells, chosen, json_lines, separated
 
         if args.csv:
             made = RowCells(dissector, session, rows.JSON_KEYS, separated(len(rows.JSON_KEYS), ",", first))
         elif args.table:
-            made = RowCells(dissector, session, args.names, separated(len(args.names), "\t"))
+            names = [name for name in args.names if name != SOURCE]
+            made = RowCells(dissector, session, names, chosen(args.names, path))
         else:
             made = RowCells(dissector, session, rows.JSON_KEYS, json_lines(rows.JSON_KEYS, source))
     else:
@@ -243,11 +261,11 @@ def _listed(
 
 
 def _cells(
-    item: JudgedRow, names: list[str], dissector: Dissector, session: Session, ours: FieldCells | None
+    item: JudgedRow, names: list[str], dissector: Dissector, session: Session, ours: FieldCells | None, path: str
 ) -> list[Cell]:
     fields = rows.fields_of(item, dissector)
     if any(name not in fields for name in names):
-        fields = {**rows.to_json(item, dissector, session), **fields}
+        fields = {**rows.to_json(item, dissector, session), **fields, SOURCE: path}
     return [
         ours.cell(name, item.row, item.transaction) if ours and name in ours else plain_cell(fields.get(name))
         for name in names

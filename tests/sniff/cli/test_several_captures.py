@@ -56,6 +56,30 @@ def test_frames_for_people_stand_under_names(site: Path, sniff485: Run) -> None:
     assert sniff485("show", CLEAN).out.splitlines()[0].lstrip().startswith("1 ")
 
 
+@pytest.mark.parametrize("more", [(), ("--reference",), ("-e", "frame.time_delta")])
+def test_chosen_fields_say_of_which_they_are(more: tuple[str, ...], site: Path, sniff485: Run) -> None:
+    expected = [
+        [str(row["no"]), name] for name, rows in by_source(sniff485("show", "--json", site).out).items() for row in rows
+    ]
+    chosen = ("show", site, "-T", "fields")
+    ran = sniff485(*chosen, "-e", "no", "-e", "source", *more)
+    assert [line.split("\t")[:2] for line in ran.out.splitlines()] == expected
+    assert "-e source" not in ran.err
+    ran = sniff485(*chosen, "-e", "source", "-e", "no", "-e", "source", "-e", "kind", *more)
+    assert [line.split("\t")[:3] for line in ran.out.splitlines()] == [[name, no, name] for no, name in expected]
+    assert [line.split("\t")[0] for line in sniff485(*chosen, "-e", "source", *more).out.splitlines()] == [
+        name for _, name in expected
+    ]
+    ran = sniff485(*chosen, "-e", "no", *more)
+    assert [line.split("\t")[0] for line in ran.out.splitlines()] == [no for no, _ in expected]
+    assert "-e source says of which each is" in ran.err
+
+
+def test_a_single_capture_has_a_source(sniff485: Run) -> None:
+    out = sniff485("show", CLEAN, "-T", "fields", "-e", "source", "-e", "no", "-c", "2").out
+    assert out == f"{CLEAN}\t1\n{CLEAN}\t2\n"
+
+
 def test_values(site: Path, sniff485: Run) -> None:
     told = by_source(sniff485("points", "--json", site).out)
     assert list(told) == names(site)
