@@ -32,8 +32,9 @@ from sniff.engine.session import NO_TIMES, Adapter, Completeness, Item, LineEven
 from sniff.formats.contents import utf16_of
 from sniff.formats.files import explain, open_capture
 from sniff.formats.log_assembly import Assembly
-from sniff.formats.log_lines import Kind, lines_in, rows_in
+from sniff.formats.log_lines import Kind
 from sniff.formats.log_margin import plain_signs
+from sniff.formats.log_pieces import lines_in, rows_in
 from sniff.formats.log_plan import LOOKED_AT, LOOKED_AT_CHARACTERS, Plan, plan_of
 from sniff.formats.log_shapes import DECODED, REMARK
 from sniff.formats.octet_table import TableLayout, delimiter_of, heading_of

@@ -12,8 +12,8 @@ _LINES_SEEN = 200
 _OURS = re.compile(r"[+~-][0-9]{1,15}(\.[0-9]{1,6})?\s+([0-9A-Fa-f]{2}([\s!]|[0-9A-Fa-f]{2}|$)|\")")
 """How a line of a text capture begins; no line of a byte log does."""
 
-_NUMBERED = re.compile(r"#\d+\b.*\b[0-9A-Fa-f]{2} [0-9A-Fa-f]{2}\b")
-"""A frame with its number, which is no comment."""
+_NUMBERED = re.compile(r"#\d+\b.*\b[0-9A-Fa-f]{2} [0-9A-Fa-f]{2}\b|(?:#\d{1,3}){4}")
+"""A frame with its number, or of numbers of characters, which is no comment."""
 
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 _WRITTEN = frozenset((*range(0x20, 0x7F), *b"\t\n\r\f\x1b", *range(0x80, 0x100)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
@@ -12,17 +12,9 @@ from dissectors.checksums import ends_with_crc16
 from dissectors.quick_values import quickly_made
 from sniff.formats.log_clock import Stamp, stamp_of
 from sniff.formats.log_octets import PAIRS_ONLY, Run, number_in, numbers_in, octets_in, whole_in
+from sniff.formats.log_pieces import LONGEST, SPACES
 from sniff.formats.log_shapes import COLOURS, REMARK, STAMP, WAYS, Role, shape_of
 from sniff.formats.log_times import AS_WRITTEN, Times
-
-LONGEST = 1 << 13
-"""Characters of a line that are looked at; a frame of a field bus is far shorter."""
-
-LONGEST_HELD = 1 << 17
-"""Characters of a line of which the end has not come; of a longer one the begin is given."""
-
-LONGEST_ROW = 1 << 20
-"""Characters of a row of a table; a longer one is none."""
 
 MOST_MORE = 512
 """Reads that one line tells."""
@@ -38,9 +30,8 @@ MOST_STAMPS = 3
 MOST_WORDS = 4
 """Between a direction and the octets; with more it is a word of a sentence."""
 
-_NUMBERED = re.compile(r"\s*#\d+[\s:.)]")
-"""A line with its number, which is no remark."""
-_SPACES = re.compile(r"\s{4,}")
+_NUMBERED = re.compile(r"\s*#\d+(?:[\s:.)]|#\d)")
+"""A line with its number, or of numbers of characters, which is no remark."""
 _WORD = re.compile(r"[A-Za-z]{2,}")
 _DIGITS = re.compile(r"(?<![0-9A-Za-z])(?:0[xX])?(?:[0-9A-Fa-f]*\d[0-9A-Fa-f]*)(?![0-9A-Za-z])|\d+")
 _WORDS = re.compile(r"[A-Za-z]{3,}")
@@ -51,7 +42,6 @@ _ROW = re.compile(
 )
 _OCTET = re.compile(r"[0-9A-Fa-f]{1,2}")
 _COLUMN = re.compile(r"\s-(?=\s|$)\s*|\s{2,}|\t|\s*[|>]")
-_LAST_DIGITS = re.compile(r"(?<![0-9A-Fa-f])[0-9A-Fa-f]+\Z")
 _PAIRS = re.compile(r"[0-9A-Fa-f]{2}(?:[ -][0-9A-Fa-f]{2})*")
 _SIXTEEN = re.compile(r"([0-9A-Fa-f]{2}(?: [0-9A-Fa-f]{2}){15}) (?![0-9A-Fa-f]{2}(?: |$)).{1,16}")
 _WORDS_OF_16 = re.compile(r"(?:[0-9A-Fa-f]{4} )*(?:[0-9A-Fa-f]{4}|[0-9A-Fa-f]{2})")
@@ -114,7 +104,7 @@ def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True, times: Times =
 
 
 def _taken_apart(text: str, base: int, rows: bool, times: Times, least: int) -> Line:
-    text = _SPACES.sub("   ", COLOURS.sub("", text))[:LONGEST].rstrip()
+    text = SPACES.sub("   ", COLOURS.sub("", text))[:LONGEST].rstrip()
     if not text.strip():
         return EMPTY
     if text.lstrip().startswith(REMARK) and not _NUMBERED.match(text):
@@ -155,67 +145,9 @@ def _taken_apart(text: str, base: int, rows: bool, times: Times, least: int) -> 
 _remembered = lru_cache(REMEMBERED)(_taken_apart)
 
 
-def rows_in(parts: Iterable[str]) -> Iterator[str]:
-    """The lines of a text that comes in parts, whole: rows of a table, whose cells may be long. Bounded."""
-    held = ""
-    for part in parts:
-        *whole, held = (held + part).split("\n")
-        for line in whole:
-            yield from line.removeprefix("\ufeff").rstrip("\r").split("\r")
-        if len(held) > LONGEST_ROW:
-            yield held
-            held = ""
-    if held:
-        yield from held.rstrip("\r").split("\r")
-
-
-def lines_in(parts: Iterable[str]) -> Iterator[str]:
-    """The lines of a text that comes in parts, wherever it is cut; long ones in pieces. Bounded."""
-    held = ""
-    for part in parts:
-        *whole, held = (held + part).split("\n")
-        for line in whole:
-            yield from _pieces_between(line.rstrip("\r"))
-        if len(held) > LONGEST_HELD:
-            *begun, held = _pieces_between(held)
-            yield from begun
-    if held:
-        yield from _pieces_between(held.rstrip("\r"))
-
-
-def _pieces_between(line: str) -> Iterator[str]:
-    """The pieces of lines that only a carriage return ends."""
-    for one in line.split("\r"):
-        yield from pieces(one.removeprefix("\ufeff"))
-
-
-def pieces(text: str) -> Iterator[str]:
-    """A line, in pieces that go on in one another where it is longer than is looked at (a whole capture on one)."""
-    if text.count("},") >= _OBJECTS and _OBJECT_BEGINS.match(text) is not None:
-        for part in _BETWEEN_OBJECTS.split(text):
-            yield from pieces(part)
-        return
-    text = text if len(text) < LONGEST else _SPACES.sub("   ", text)
-    while len(text) > LONGEST - 2:
-        cut = max(text.rfind(" ", LONGEST // 2, LONGEST - 2), text.rfind(",", LONGEST // 2, LONGEST - 2) + 1)
-        if cut <= 0:  # digits without space, in pairs from where they begin
-            digits = _LAST_DIGITS.search(text, 0, LONGEST - 2)
-            begin = digits.start() if digits is not None else 0
-            cut = begin + (LONGEST - 2 - begin) // 2 * 2
-        yield f"{text[:cut]} \\"
-        text = text[cut:]
-    yield text
-
-
-_OBJECTS = 3
-_OBJECT_BEGINS = re.compile(r"[^{}]{0,200}\[\s*\{")
-_BETWEEN_OBJECTS = re.compile(r"(?<=\}),\s*(?=\{)")
-"""Between objects of a list that is all on one line."""
-
-
 def numbers_of(text: str) -> tuple[str, ...]:
     """The numbers of a line that may be octets, as they are written."""
-    text = _SPACES.sub("   ", COLOURS.sub("", text))[:LONGEST].rstrip()
+    text = SPACES.sub("   ", COLOURS.sub("", text))[:LONGEST].rstrip()
     if text.lstrip().startswith(REMARK) and not _NUMBERED.match(text):
         return ()
     text = _without_stamps(text)[1]

@@ -175,11 +175,13 @@ _ESCAPES = rf"(?:\\x{H2}|\\[abtnvfr0\\])"
 _CONTROL = rf"<(?:{'|'.join(_NAMED)})>"
 _HEX = _by(H2, 16)
 
+ESCAPED_STRING = r"(?P<q>['\"])(?=(?:(?!(?P=q))[^\\]|\\[\\'\"]){0,400}\\[x0-7abtnvfr])"
+"""How a string in quotes begins that has escapes in it."""
+
 SPELLINGS: tuple[Spelling, ...] = (
     Spelling("frames as characters", r"(?::(?:[0-9A-F]{2}){3,260}|>[0-9A-F]{4,260})(?:<CR>|<LF>|\\r|\\n)*", None,
              _frame_of_characters, 1, before=r"(?<![0-9A-Za-z_#.>])"),
-    Spelling("byte strings", r"(?:b|bytearray\(b)?(?P<q>['\"])(?=(?:(?!(?P=q))[^\\]){0,400}\\[x0-7abtnvfr])"
-                             r"(?:(?!(?P=q))[^\\]|\\.)*(?P=q)", None, _escaped, 1,
+    Spelling("byte strings", rf"(?:b|bytearray\(b)?{ESCAPED_STRING}(?:(?!(?P=q))[^\\]|\\.)*(?P=q)", None, _escaped, 1,
              before=r"(?<![0-9A-Za-z_])", after=""),
     Spelling("escapes", _ESCAPES, r"[ ,]?", _escapes_alone, 2, before=""),
     Spelling("pairs in brackets", rf"(?:\[{H2}\]|<{H2}>|\({H2}\)|\{{{H2}\}})", r"[ ,]?", _HEX, 2, before="",

@@ -30,6 +30,7 @@ from itertools import pairwise
 from dissectors.checksums import ends_with_crc16
 from sniff.formats.dump_rows import cells_of, pairs_of_row
 from sniff.formats.log_shapes import WAYS
+from sniff.formats.log_spellings import ESCAPED_STRING
 
 MOST_JOINED = 6000
 """Characters of a list that is put on one line."""
@@ -84,7 +85,7 @@ class Writing:
             text = _CHARACTER_STRINGS.sub(_joined_strings, text)
         if self.escapes is not Escapes.USUAL and "\\" in text:
             text = _rewritten_escapes(text, self.escapes)
-        if self.mixed and "\\" in text:
+        if self.mixed and "\\" in text and _QUOTED.search(text) is None:
             text = _MIXED.sub(_as_escapes, text)
         if self.brackets:
             text = _in_brackets(text, self.brackets)
@@ -108,7 +109,7 @@ def writing_of(texts: Sequence[str]) -> Writing:
         cells_of(texts),
         _is_base64(texts),
         _annotations_of(texts),
-        sum(any(_AMONG_ESCAPES.search(match[0]) for match in _MIXED.finditer(text)) for text in slashed) >= _LEAST,
+        sum(any(map(_is_mixed, _MIXED.finditer(text))) for text in slashed if not _QUOTED.search(text)) >= _LEAST,
     )
 
 
@@ -234,8 +235,17 @@ _ESCAPE = r"\\(?:x[0-9A-Fa-f]{2}|[abtnvfr0\\])"
 _MIXED = re.compile(
     rf"(?:(?<=[\s:=>])|^)(?![^\s\\]{{0,12}}['\"])[!-9;<?-\[\]-~]*{_ESCAPE}(?:[!-\[\]-~]|{_ESCAPE})*(?!\S)"
 )
+_QUOTED = re.compile(
+    rf"(?<![^\s:=(\[{{,>])(?:b|bytearray\(b)?{ESCAPED_STRING}"
+    r"(?:(?!(?P=q))[^\\]|\\.)*(?P=q)"
+)
+"""A string with escapes, in which whatever stands is a character of it."""
 _AMONG_ESCAPES = re.compile(r"\\x[0-9A-Fa-f]{2}(?![ ,;])[!-\[\]-~]+\\x[0-9A-Fa-f]{2}")
 _ONE = re.compile(rf"{_ESCAPE}|(.)")
+
+
+def _is_mixed(match: re.Match[str]) -> bool:
+    return _AMONG_ESCAPES.search(match[0]) is not None
 
 
 def _as_escapes(match: re.Match[str]) -> str:

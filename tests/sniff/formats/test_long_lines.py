@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from dissectors.frame import Chunk
 from sniff.formats import read
-from sniff.formats.log_lines import LONGEST_HELD, lines_in
+from sniff.formats.log_pieces import LONGEST_HELD, lines_in
 
 MANY = 50_000
 OCTETS = random.Random(485).randbytes(MANY)
@@ -24,6 +25,52 @@ def test_no_octet_is_lost(between: str, encoding: str, tmp_path: Path) -> None:
     path.write_text(between.join(f"{octet:02X}" for octet in OCTETS) + "\n", encoding=encoding)
     capture = read(path)
     assert b"".join(block.reads.octets.tobytes() for block in capture.blocks()) == OCTETS  # type: ignore[union-attr]
+    assert capture.completeness().whole
+
+
+SPELLINGS: dict[str, Callable[[bytes], str]] = {
+    "brackets": lambda octets: "".join(f"[{one:02X}]" for one in octets),
+    "brackets apart": lambda octets: " ".join(f"[{one:02X}]" for one in octets),
+    "angles": lambda octets: "".join(f"<{one:02X}>" for one in octets),
+    "escapes": lambda octets: "".join(f"\\x{one:02x}" for one in octets),
+    "escapes in quotes": lambda octets: '"' + "".join(f"\\x{one:02x}" for one in octets) + '"',
+    "a Python string": lambda octets: repr(octets),
+    "0x": lambda octets: " ".join(f"0x{one:02X}" for one in octets),
+    "0x joined": lambda octets: "".join(f"0x{one:02X}" for one in octets),
+    "0x in a list": lambda octets: ",".join(f"0x{one:02X}" for one in octets),
+    "digits and h": lambda octets: " ".join(f"{one:02X}h" for one in octets),
+    "digits behind $": lambda octets: "".join(f"${one:02X}" for one in octets),
+    "digits behind %": lambda octets: "".join(f"%{one:02X}" for one in octets),
+    "character codes": lambda octets: "".join(f"#{one}" for one in octets),
+    "decimals": lambda octets: " ".join(str(one) for one in octets),
+    "a list of decimals": lambda octets: "[" + ", ".join(str(one) for one in octets) + "]",
+    "hyphens": lambda octets: octets.hex("-"),
+    "colons": lambda octets: octets.hex(":"),
+    "each with its number": lambda octets: ", ".join(f"0x{one:02X} ({one})" for one in octets),
+    "each with its number behind a space": lambda octets: " ".join(f"{one:02X} ({one})" for one in octets),
+    "bits": lambda octets: " ".join(f"{one:08b}" for one in octets),
+    "words": lambda octets: " ".join(octets[at : at + 2].hex() for at in range(0, len(octets), 2)),
+}
+
+
+@pytest.mark.parametrize("spelling", SPELLINGS)
+@pytest.mark.parametrize("ahead", ["", "2026-03-01 10:00:00.125 RX: "])
+def test_no_octet_is_lost_however_it_is_written(ahead: str, spelling: str, tmp_path: Path) -> None:
+    octets, path = OCTETS[:12_345], tmp_path / "one.log"
+    path.write_text(ahead + SPELLINGS[spelling](octets) + "\n")
+    capture = read(path)
+    assert b"".join(item.octets for item in capture.items() if isinstance(item, Chunk)) == octets
+    assert capture.completeness().whole
+
+
+@pytest.mark.parametrize("size", [16, 250])
+@pytest.mark.parametrize("written", [repr, lambda octets: "".join(f"#{one}" for one in octets)])
+def test_lines_of_strings_and_codes_are_whole(written: Callable[[bytes], str], size: int, tmp_path: Path) -> None:
+    path = tmp_path / "many.log"
+    parts = [OCTETS[at : at + size] for at in range(0, 12_000, size)]
+    path.write_text("".join(f"{written(part)}\n" for part in parts))
+    capture = read(path)
+    assert b"".join(item.octets for item in capture.items() if isinstance(item, Chunk)) == b"".join(parts)
     assert capture.completeness().whole
 
 
