@@ -1,5 +1,7 @@
 """MQTT: a connection to a broker that is kept up, and told again all that stands when it comes back.
 
+What a run before left standing at the broker is looked for once a bus is known, and taken away.
+
 While there is no broker only the newest of each topic is kept; what it replaces is counted as dropped. A broker that
 takes nothing in costs its time limit and then the connection, never more memory than one window of messages.
 """
@@ -13,7 +15,7 @@ import secrets
 import ssl
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sniff.analysis.sanitizing import sanitized
 from sniff.outlet_settings import MqttSettings, SettingsError
@@ -39,6 +41,12 @@ BACKOFF = (1.0, 2.0, 5.0, 10.0, 30.0)
 """Seconds before the next try to connect."""
 
 TAKEN_AT_ONCE = 512
+
+LOOKED_FOR = 5.0
+"""Seconds in which a broker tells what it kept."""
+
+MOST_INCOMING = 1000
+"""Messages of the broker that wait to be looked at; of those beyond, the next run takes care."""
 
 
 class MqttOutlet(Outlet):
@@ -124,7 +132,7 @@ class MqttOutlet(Outlet):
             tls_context=self._context,
             timeout=PATIENCE,
             keepalive=30,
-            max_queued_incoming_messages=1,  # nothing is subscribed to
+            max_queued_incoming_messages=MOST_INCOMING,
             max_queued_outgoing_messages=2 * WINDOW,
             max_inflight_messages=WINDOW,
             max_concurrent_outgoing_calls=2 * WINDOW,
@@ -145,28 +153,45 @@ class MqttOutlet(Outlet):
         await client.publish(self._messages.status_topic, ONLINE, 1, True)
         for topic in self._kept:
             self._unsent.setdefault(topic, False)
-        while True:
-            self._news.clear()
-            took = self._absorb()
-            await self._deliver(client)
-            self._behind = self._behind and took == TAKEN_AT_ONCE
-            if self._closing and not took:
-                await client.publish(self._messages.status_topic, OFFLINE, 1, True)
-                return
-            if not took:
-                await self._until_news(client)
-
-    async def _until_news(self, client: Client) -> None:
-        """Wait for something to tell, or for the connection to end, which raises."""
-        news = asyncio.ensure_future(self._news.wait())
-        incoming = asyncio.ensure_future(anext(client.messages))
+        reading = asyncio.ensure_future(self._read(client))
+        reading.add_done_callback(lambda done: done.cancelled() or done.exception())  # whoever delivers finds it too
+        looking = _Looking()
         try:
-            done, _ = await asyncio.wait({news, incoming}, return_when=asyncio.FIRST_COMPLETED)
-            if incoming in done:
-                incoming.result()
+            while True:
+                self._news.clear()
+                took = self._absorb()
+                await looking.go_on(client, self._messages.leftovers)
+                await self._deliver(client)
+                self._behind = self._behind and took == TAKEN_AT_ONCE
+                if self._closing and not took:
+                    break
+                if not took:
+                    await self._until_news(reading, looking.left)
+            for publication in self._messages.at_the_end():
+                self._keep(publication)
+            await self._deliver(client)
+            await client.publish(self._messages.status_topic, OFFLINE, 1, True)
         finally:
-            for task in (news, incoming):
-                task.cancel()
+            reading.cancel()
+
+    async def _read(self, client: Client) -> None:
+        """Take away what a run before left; ends by raising, with the connection."""
+        async for message in client.messages:
+            topic = str(message.topic)
+            if message.retain and message.payload and topic not in self._kept:
+                self._keep(Publication(topic, b""))
+                self._news.set()
+
+    async def _until_news(self, reading: asyncio.Future[None], seconds: float | None) -> None:
+        """Wait for something to tell, so many seconds at most, or for the connection to end, which raises."""
+        news = asyncio.ensure_future(self._news.wait())
+        either: set[asyncio.Future[Any]] = {news, reading}
+        try:
+            done, _ = await asyncio.wait(either, timeout=seconds, return_when=asyncio.FIRST_COMPLETED)
+            if reading in done:
+                reading.result()
+        finally:
+            news.cancel()
 
     def _absorb(self) -> int:
         """Take what was told, and see what of it has to be sent; how many things it was."""
@@ -217,6 +242,32 @@ class MqttOutlet(Outlet):
             failed = next((result for result in results if result is not None), None)
             if failed is not None:
                 raise failed
+
+
+class _Looking:
+    """Asks a broker, on one connection, for what it kept of some topics, and then for nothing any more."""
+
+    def __init__(self) -> None:
+        self._asked: set[str] = set()
+        self._until: float | None = None
+
+    @property
+    def left(self) -> float | None:
+        """Seconds until it is over; None: it is."""
+        return None if self._until is None else max(0.0, self._until - asyncio.get_running_loop().time())
+
+    async def go_on(self, client: Client, patterns: frozenset[str]) -> None:
+        """Ask for what was not asked for yet; a broker that does not tell is none that keeps us from telling."""
+        from aiomqtt import MqttCodeError
+
+        with contextlib.suppress(MqttCodeError):
+            for pattern in patterns - self._asked:
+                self._asked.add(pattern)
+                self._until = asyncio.get_running_loop().time() + LOOKED_FOR
+                await client.subscribe(pattern, 1, timeout=PATIENCE)
+            if self.left == 0:
+                self._until = None
+                await client.unsubscribe(sorted(self._asked), timeout=PATIENCE)
 
 
 def _tls(settings: MqttSettings) -> ssl.SSLContext:

@@ -10,6 +10,9 @@ wants to know to show them. Pure.
     PREFIX/BUS/findings/CODE/SUBJECT      what stands; empty when it is over                        retained
     PREFIX/BUS/problem                    ON while an error or a warning stands, else OFF           retained
 
+A finding stands while somebody listens: at the end of a run its topic is emptied, and what a run that did not end so
+left is taken away by the next one on the same bus (`Messages.leftovers`).
+
 A name is part of a topic: what MQTT takes for a separator or a wildcard is written otherwise, and two names never share
 a topic.
 """
@@ -116,7 +119,8 @@ class Messages:
         self._discovery = discovery
         self._topics = Topics()
         self._discovered: set[str] = set()
-        self._standing: dict[str, dict[tuple[str, str], Severity]] = {}
+        self._standing: dict[str, dict[tuple[str, str], tuple[Severity, str]]] = {}  # by bus; how grave, and its topic
+        self._buses: dict[str, ToldBus] = {}
         self.dropped = 0
 
     @property
@@ -191,6 +195,7 @@ class Messages:
 
     def _finding(self, told: FindingTold) -> Iterator[Publication]:
         one, bus = told.news.finding, told.bus.name
+        self._buses[bus] = told.bus
         events, stands = self._topic(bus, "findings"), self._topic(bus, "findings", one.code, one.subject)
         if events is None or stands is None:
             self.dropped += 1
@@ -202,10 +207,25 @@ class Messages:
         standing = self._standing.setdefault(bus, {})
         standing.pop(one.key, None)
         if not over:
-            standing[one.key] = one.severity
+            standing[one.key] = one.severity, stands
         yield from self._problem(told.bus)
 
+    def at_the_end(self) -> Iterator[Publication]:
+        """What makes findings stand no more, since nobody will say when they are over."""
+        for name, standing in self._standing.items():
+            for _, topic in standing.values():
+                yield Publication(topic, b"")
+            standing.clear()
+            yield from self._problem(self._buses[name])
+
+    @property
+    def leftovers(self) -> frozenset[str]:
+        """Patterns of the topics in which a run before may have left findings of the buses that were told."""
+        topics = (self._topic(name, "findings") for name in self._buses)
+        return frozenset(f"{topic}/#" for topic in topics if topic is not None)
+
     def _state(self, told: StateTold) -> Iterator[Publication]:
+        self._buses[told.bus.name] = told.bus
         topic = self._topic(told.bus.name, "status")
         if topic is not None:
             yield Publication(topic, (ONLINE if told.listening else OFFLINE).encode())
@@ -216,7 +236,7 @@ class Messages:
         if topic is None:
             return
         yield from self._announce(bus, None, topic, "problem", {"device_class": "problem"}, kind="binary_sensor")
-        bad = any(severity >= Severity.WARNING for severity in self._standing.get(bus.name, {}).values())
+        bad = any(severity >= Severity.WARNING for severity, _ in self._standing.get(bus.name, {}).values())
         yield Publication(topic, b"ON" if bad else b"OFF")
 
     def _announce(

@@ -95,6 +95,10 @@ class Subscriber:
     def _take(self, client: Any, data: Any, message: Any) -> None:
         self.got[message.topic] = message.payload
 
+    def keep(self, topic: str, payload: bytes) -> None:
+        """Have the broker keep something."""
+        self._client.publish(topic, payload, 1, True).wait_for_publish(60)
+
     def until(self, topic: str, payload: bytes | None = None) -> bytes:
         """What came of a topic, or until this did."""
         wait_until(

@@ -92,11 +92,34 @@ def test_values_discovery_and_findings_arrive_also_after_the_broker_was_gone(
         assert command.end() == 0
         subscriber.until("sniff485/status", b"offline")
         subscriber.until("sniff485/x/status", b"offline")
+        subscriber.until("sniff485/x/findings/MB001/station-7", b"")  # nobody will say when it is over
+        subscriber.until("sniff485/x/problem", b"OFF")
         subscriber.close()
         assert octets_of(tmp_path / "x.mcap") == bytes(bus.fed), "the capture is whole all the same"
     said = "\n".join(command.said)
     assert PASSWORD not in said
     assert PASSWORD.encode() not in (tmp_path / "x.mcap").read_bytes()
+
+
+@real_broker
+def test_findings_that_a_killed_run_left_are_taken_away(bus: Feeder, broker: Mosquitto, tmp_path: Path) -> None:
+    configure(tmp_path, bus, f'[mqtt]\nbroker = "mqtts://{USER}@localhost:{broker.port}"\nca = "{broker.ca}"\n')
+    stale, others = "sniff485/x/findings/MB001/station-9", "sniff485/y/findings/MB001/station-9"
+    subscriber = broker.subscribe()
+    for topic in (stale, others):
+        subscriber.keep(topic, b"{}")
+        subscriber.until(topic, b"{}")
+    with recordings(tmp_path, "x") as begin:
+        command = begin(environment={"SNIFF485_MQTT_PASSWORD": PASSWORD})
+        bus.poll(POLL + ANSWER + UNANSWERED, 0.05)
+        subscriber.until(stale, b"")
+        assert json.loads(subscriber.until("sniff485/x/findings/MB001/station-7"))["what"] == "new"
+        bus.quiet()
+        bus.until_read()
+        command.send(15)
+        assert command.end() == 0
+    assert subscriber.got[others] == b"{}"
+    subscriber.close()
 
 
 @real_broker
