@@ -31,6 +31,8 @@ _LRCS: Final[dict[Mistake, Callable[[bytes, bytes], int]]] = {
 }
 """What a sender may take for the LRC of a message: of its octets, or of the characters that they are sent as."""
 
+_UPPER_BITS: Final = 0x8080  # of both octets of a CRC
+
 _CRC: Final = Mistake("which is a CRC-16, not an LRC", "the sender's program puts the check of RTU into an ASCII frame")
 _LEFT_OUT: Final = Mistake("which is left out", "the sender's program sends no check", by_chance=False)
 
@@ -49,6 +51,8 @@ def _rtu(frame: Frame) -> Iterator[tuple[Way, int]]:
         return
     received, right = check
     octets = len(frame.octets)
+    if not (received ^ right) & ~_UPPER_BITS and max(frame.octets) < 0x80:
+        return  # received with 7 data bits
     begun_with_0 = int.from_bytes(crc16_modbus(bytes(octets - 2)).to_bytes(2, "little"), "big")
     yield Way(ALIKE, received ^ right, octets, received ^ right == begun_with_0), right
     if received in (0, 0xFFFF):

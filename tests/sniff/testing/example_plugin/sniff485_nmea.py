@@ -109,6 +109,6 @@ def scenarios() -> Mapping[str, SimulatedBus]:
 
 
 NMEA = Dissector(
-    "nmea", "NMEA 0183", framer, peek, Announcements, text, fields, packet, "4800,8N1",
+    "nmea", "NMEA 0183", framer, peek, Announcements, text, fields, packet, default_line="4800,8N1",
     bits=bits, makers={"nmea": make}, scenarios=scenarios,
 )  # fmt: skip
