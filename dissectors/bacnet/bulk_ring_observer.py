@@ -116,7 +116,7 @@ class BulkRingObserver(MstpRingObserver):
         self._storms.see_many(columns.end[rows][columns.to_all[rows]].tolist())
         self._reads.pass_by(frame)
         columns.turns.teach(self._turn, begin, end, frame)
-        self._before, self._doubt = frame, False
+        self._before, self._doubt, self._breaks_in = frame, False, False
         self._quiet_since, self._quiet_slack = frame.end, frame.slack
 
 

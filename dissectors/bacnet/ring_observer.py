@@ -182,6 +182,7 @@ class MstpRingObserver(TokenWatch):
         check_addresses(tally, no, frame, frame_type, source, destination)
         if source != self._holder:
             self._disturbed = True
+        self._breaks_in = source != self._holder and not answers
         if self._doubt and not answers and frame_type in AT_ONCE:
             self._answers_unread(destination)
         if frame_type == _TOKEN:

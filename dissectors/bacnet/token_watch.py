@@ -49,6 +49,7 @@ class TokenWatch:
         self._got: int | None = None  # when the holder got the token
         self._hold = 0  # data frames sent on this token
         self._doubt = True  # something may have been missed since the last good frame
+        self._breaks_in = False  # whether the last good frame was unasked, and its sender had no token
         self._broke_off = False  # that is a frame of the holder that was cut short, and nothing else
         self._before: Frame | None = None  # the last good frame
         self._quiet_since: int | None = None  # end of the last event of any kind
@@ -107,11 +108,14 @@ class TokenWatch:
         return silence >= longest_wait(others)
 
     def _was_interrupted(self) -> bool:
-        """Whether the last good frame was neither by nor for the holder of the token, who may have let go of it then.
+        """Whether the last good frame was none that the holder of the token sent or asked for.
 
-        Damage in between (`_doubt`) may have been the token, or its use.
+        Whoever hears something else while it polls or passes its token takes it that another one has a token, and lets
+        go of its own. Damage in between (`_doubt`) may have been the token, or its use.
         """
         before = self._before
+        if self._breaks_in:
+            return True
         return before is not None and self._holder is not None and self._holder not in before.octets[3:5]
 
     def _take_turn(self, no: int, frame: Frame, source: int, node: NodeTally, header: Header) -> None:

@@ -77,6 +77,12 @@ def _unasked(*, seed: int) -> Station:
     return SpeaksUnasked(npdu_frame(1, 200, value, expects_reply=False), 700 * MS + seed * 7 * MS)
 
 
+def _behind_polls(*, seed: int) -> Station:
+    """The same, into the wait for the answer to a poll: whoever polls lets go of its token then."""
+    frame_of_value = npdu_frame(3, 200, i_am(200).npdu, expects_reply=False)
+    return SpeaksUnasked(frame_of_value, 3 * S + seed * 7 * MS, behind=FrameType.POLL_FOR_MASTER)
+
+
 def _twin(mac: int, *, seed: int) -> Station:
     """A second master with that number; it answers what it is asked with values of its own."""
     other = drive(mac)
@@ -203,6 +209,13 @@ MSTP_CASES: tuple[Case, ...] = (
     Case(
         "MS/TP slave speaks unasked",
         Ring(_four, others={"slave": _unasked}),
+        (Said(("MAC 200",), words=_UNASKED),),
+        never=("MS104", "MS501"),
+        seconds=30,
+    ),
+    Case(
+        "MS/TP slave speaks behind polls, tokens get lost",
+        Ring((Member(3, partial(controller, 9)), _five, _nine), others={"slave": _behind_polls}),
         (Said(("MAC 200",), words=_UNASKED),),
         never=("MS104", "MS501"),
         seconds=30,

@@ -151,14 +151,15 @@ class AnswersTests:
 
 
 class SpeaksUnasked:
-    """A slave that sends a value by itself, every `every` ns, as soon as the line is free for `free` ns."""
+    """A slave that sends a value by itself, every `every` ns, as soon as the line is free for `free` ns; directly
+    behind a frame of the type `behind`, if one is named."""
 
-    def __init__(self, octets: bytes, every: int, free: int = 1_500_000) -> None:
-        self.octets, self.every, self.free = octets, every, free
+    def __init__(self, octets: bytes, every: int, free: int = 1_500_000, behind: FrameType | None = None) -> None:
+        self.octets, self.every, self.free, self.behind = octets, every, free, behind
         self.due = every
 
     def hear(self, now: int, octets: bytes, quiet: bool) -> tuple[Send, ...]:
-        if now < self.due:
+        if now < self.due or (self.behind is not None and octets[2:3] != bytes((self.behind,))):
             return ()
         self.due = now + self.every
         return (Send(now + self.free, self.octets),)
