@@ -238,7 +238,7 @@ class BusWatch:
         cut = self._interruption
         if cut is not None and cut.holder == source:
             self._tell(Notice.OUT_OF_TURN, cut.by, cut.no, cut.time)
-            self._interruption = None
+            self._interruption, self._holder = None, source
 
     def _is_at_once(self, frame: Frame) -> bool:
         """Whether it is sure that less silence was before a frame than any master waits before it claims the token."""

@@ -47,10 +47,23 @@ LOST = [*turn(1, 2), *turn(2, 1)] * 2 + [*turn(1, 2)[:-1], *turn(2, 1)]  # the t
 NEVER = turn(2, 1) * 4  # nothing that 1 sends is heard
 TOOL = [*turn(1, 2), (1, telegram(5, 3, 0x6D, dsap=60, ssap=62)), *turn(2, 1)]  # 3 speaks, and 2 goes on with the token
 
+_ASKING = (1, telegram(5, 3, 0x6D, dsap=60, ssap=62))
+ALONE = [*turn(1, 1), _ASKING, *[(1, token(1, 1))] * 3]  # 1 is the only master, and passes the token to itself
+GONE = [*turn(1, 2), *turn(2, 3)[:-1], _ASKING, (200, token(1, 1)), *[(1, token(1, 1))] * 3]  # 1 claims it anew
 
-@pytest.mark.parametrize(("heard", "is_told"), [(LOST, False), (NEVER, False), (TOOL, True)])
+
+@pytest.mark.parametrize(
+    ("heard", "is_told"),
+    [(LOST, False), (NEVER, False), (TOOL, True), (ALONE, True), (GONE, False)],
+)
 def test_who_speaks_while_another_one_holds_the_token(heard: Telegrams, is_told: bool) -> None:
     assert (found(judged(list(heard) * 4), "PB015") is not None) is is_told
+
+
+def test_each_time_that_the_holder_goes_on_counts() -> None:
+    told = found(judged([*turn(1, 1), *[*exchange(0, by=1), _ASKING] * 6]), "PB015")
+    assert told is not None
+    assert told.count == 5  # behind the last one nobody goes on
 
 
 def test_a_taker_that_is_never_heard_is_one_that_this_tap_does_not_hear() -> None:
