@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import sqrt
 from typing import Final
 
+from dissectors.chances import at_least
 from dissectors.findings import Tally, together
 from dissectors.n2.record import Damages
 from dissectors.strikes import Strikes
@@ -13,8 +13,11 @@ from dissectors.strikes import Strikes
 OUTSTANDING: Final = 4
 """So many times the damage that noise at the rate of all others would have done make it a sender's own."""
 
+UNLIKELY: Final = 0.01
+"""Chance below which it is no chance that noise struck any one sender so often."""
+
 SELDOM_ALONE: Final = 0.05
-"""Chance below which it is no chance that all strikes fell on one sender."""
+"""Chance below which it is no chance that all strikes fell on one sender, whichever it is."""
 
 
 def blamed(senders: Mapping[str, Damages], strikes: Strikes) -> dict[str, Tally]:
@@ -29,7 +32,8 @@ def blamed(senders: Mapping[str, Damages], strikes: Strikes) -> dict[str, Tally]
     struck = {name: sent.bad for name, sent in left.items() if sent.bad.count}
     if len(struck) == 1:
         ((name, _),) = struck.items()
-        if (left[name].octets / octets) ** strikes.of(name, left[name].bad.count) <= SELDOM_ALONE:
+        chance = (left[name].octets / octets) ** strikes.of(name, left[name].bad.count)
+        if chance * len(left) <= SELDOM_ALONE:  # any of them might have been struck alone
             return named | struck
     return named | ({"bus": together(struck.values())} if struck else {})
 
@@ -44,6 +48,7 @@ def _outstanding(senders: Mapping[str, Damages], strikes: Strikes) -> str | None
         if mine < 3 or not rest:
             continue
         due = (bad - mine + 0.5) / rest * sent.octets
-        if mine > OUTSTANDING * due and mine > due + 3 * sqrt(due):
+        chance = at_least(mine, bad, sent.octets / octets)
+        if mine > OUTSTANDING * due and chance * len(senders) < UNLIKELY:  # any of them might have been struck most
             worst = max(worst or (0.0, ""), (mine / due, name))
     return worst[1] if worst is not None else None

@@ -38,13 +38,13 @@ def standing_out(struck: Struck, master: str = "") -> set[str]:
 
 
 def only_struck(struck: Struck) -> set[str]:
-    """The only one that is struck, where chance would seldom have struck it alone; else nobody."""
+    """The only one that is struck, where chance would seldom have struck one alone, whoever it is; else nobody."""
     shares = sum(share for _, share in struck.values())
     hit = [(name, count, share) for name, (count, share) in struck.items() if count]
     if len(hit) != 1 or not shares:
         return set()
     ((name, count, share),) = hit
-    return {name} if (share / shares) ** count <= SELDOM_ALONE else set()
+    return {name} if len(struck) * (share / shares) ** count <= SELDOM_ALONE else set()
 
 
 def _standing_out(struck: Struck) -> set[str]:

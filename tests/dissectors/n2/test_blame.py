@@ -40,9 +40,17 @@ def test_a_sender_with_far_more_than_its_share_is_named_alone():
 
 
 def test_the_only_one_that_is_struck_is_named():
-    assert blame(master=(5000, 0), first=(5000, 5)) == {"first": 5}
+    assert blame(master=(5000, 0), first=(5000, 6)) == {"first": 6}
+    several = {f"station {number}": (5000, 0) for number in range(1, 8)}
+    assert blame(**several, master=(5000, 0), last=(5000, 2)) == {"bus": 2}  # any of nine might have been struck twice
     assert blame(master=(5000, 0), first=(5000, 2)) == {"bus": 2}
     assert blame(master=(5000, 0), first=(5000, 0)) == {}
+
+
+def test_with_many_senders_one_is_struck_more_than_others_by_chance():
+    many = {f"station {number}": (5000, 1) for number in range(16)}
+    assert blame(**many, last=(5000, 3)) == {"bus": 19}
+    assert blame(**many, last=(5000, 12)) == {"last": 12, "bus": 16}
 
 
 def test_what_is_repeated_into_one_disturbance_is_one_strike():
