@@ -71,8 +71,11 @@ class Masters:
             self.seen.add(asked.frame.start, last.row, asked.row)
 
     def see_late(self, transaction: Transaction, station: N2StationRecord) -> None:
-        """Take an answer that came after the next command."""
+        """Take an answer that came after the next command: directly behind that one, else the master had something that
+        it took for the answer, a late one to its first try perhaps, and went on."""
         latency = transaction.latency
+        if transaction.response != (transaction.request or 0) + 2:
+            return
         if latency is not None and latency.high < HASTE and station.answered >= KNOWN:
             self.seen.add(transaction.start, transaction.response)
 

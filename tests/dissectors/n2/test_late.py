@@ -5,6 +5,9 @@ from __future__ import annotations
 import pytest
 
 from dissectors.n2.envelope import make_answer, make_command
+from dissectors.n2.masters import Masters
+from dissectors.n2.record import N2StationRecord
+from dissectors.tracker import Interval, Transaction, Verdict
 from tests.dissectors.n2.heard import in_turns, warned_of
 
 SPOILT = b">031102@\x08140000E9\r"
@@ -37,3 +40,13 @@ def test_a_master_that_asks_for_the_next_point_soon_had_its_answer(wait: int, is
     commands = [make_command(f"0211{point:02X}03") for point in (1, 2, 3)] * 6
     found = told([asked(1), *([one] for one in commands), asked(1)], wait)
     assert found == {("N2015", "bus") if is_told else ("N2005", "station 2")}
+
+
+@pytest.mark.parametrize(("response", "is_told"), [(42, True), (43, False)])
+def test_who_had_something_before_it_went_on_is_no_second_master(response: int, is_told: bool) -> None:
+    """A command in row 40, one in row 41, and 20 ms after the first its answer; or a late one of an earlier command
+    between the two, which the master took for its answer."""
+    masters, took = Masters(), Interval(20_000_000, 20_000_000, 20_000_000)
+    late = Transaction(1, 3, "poll", 40, response, Verdict.LATE, 0, took.nominal, took)
+    masters.see_late(late, N2StationRecord(answered=20))
+    assert bool(masters.seen.count) is is_told
