@@ -187,7 +187,8 @@ _ALL = (
         "octets that are no frame",
         "Stretches of four octets or more that are no frame, and what follows a damaged frame: 1 in 50 octets or more "
         "of all. A smaller share is only noted. Said is where they are another protocol's frames with good checks, "
-        "where they are always the same, and where they were sent with a slower baud rate.",
+        "where they are always the same, and where they were sent with a slower baud rate. Where nearly all come in "
+        "place of the answers of one station that is not heard otherwise, it is told of that station.",
         "damaged frames beyond recognition, another protocol on the same line, or a device with another baud rate",
         "what the stretches have in common: their place, time and first octets",
         told_by=_DAMAGED,

@@ -11,6 +11,7 @@ from dissectors.findings import Finding, Severity, Tally, counted
 from dissectors.frame import Chunk, Noise
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, other_protocol
+from sniff.analysis.sender_findings import BUS
 from sniff.analysis.slower_bus import slower_by
 from sniff.analysis.stray_findings import INSTEAD, INSTEAD_LEAST
 from sniff.engine.session import Session
@@ -62,17 +63,24 @@ class Remains:
             return None
         share = self.octets / of_all
         stretches = counted(self._tally.count, "stretch", "stretches")
-        words = f"{self.octets} octets in {stretches} are no frame, {share:.1%} of all{self._of_one(heard)}"
+        words, (name, count) = (
+            f"{self.octets} octets in {stretches} are no frame, {share:.1%} of all",
+            self._of_one(heard),
+        )
+        words += f", {count} of them in place of its answers" if count else ""
         severity = None if share >= 0.02 and self._tally.count > 1 else Severity.NOTE
-        finding = self._told(self._tally.found(RULES["LN204"], "bus", words, severity))
+        finding = self._told(self._tally.found(RULES["LN204"], name, words, severity))
         return replace(finding, is_told_apart=True) if share >= MORE_THAN_REMAINS else finding
 
-    def _of_one(self, heard: Set[str]) -> str:
-        """Whose answers they stand for, where nearly all are one's of whom no frame is heard, though of others."""
+    def _of_one(self, heard: Set[str]) -> tuple[str, int]:
+        """In place of whose answers they stand and how many, where nearly all are one's; else the bus's.
+
+        Of that one no frame is heard, though of others.
+        """
         ((name, count),) = self._instead.most_common(1) or (("", 0),)
         if not heard or name in heard or count < max(INSTEAD_LEAST, INSTEAD * self._tally.count):
-            return ""
-        return f", {count} of them in place of the answers of {name}"
+            return BUS, 0
+        return name, count
 
     def _told(self, finding: Finding) -> Finding:
         """With what the stretches have in common."""

@@ -8,12 +8,14 @@ from typing import Any
 
 from dissectors.bacnet.application import Application, Poller
 from dissectors.frame import Place
+from dissectors.line import LineSettings
 from dissectors.modbus.simulated_master import read_holding
 from dissectors.n2.simulated import reading
 from dissectors.simulated import Station
 from dissectors.simulated_faults import BitFlips, LateResponse, LostResponse, NoiseInGaps
 from sniff.simulation.tap import FTDI
 from tests.faults.case import Case, Said
+from tests.faults.hearing import of_party, sent_otherwise
 from tests.faults.misbehaving import OnTheTick, Trimmed, When
 from tests.faults.ring_programs import controller, drive, fault_input
 from tests.faults.stations import Dies, Of, Shows
@@ -148,6 +150,13 @@ N2_CASES: tuple[Case, ...] = (
         "N2 bit errors of the supervisor",
         N2(_turns, _followers, (BitFlips(6e-3, ("supervisor",)),)),
         (Said(("master", "bus"), ("N2004",), r"damag"),),
+    ),
+    Case(
+        "N2 one drive at half the baud rate",
+        N2(_turns, _followers),
+        (("LN204", "station 2"), ("N2005", "station 2")),
+        hear=partial(sent_otherwise, partial(of_party, "drive 2", LineSettings(4800, 8, "N", 1))),
+        seeds=1,
     ),
     # what a device says of itself, in each protocol
     Case(

@@ -57,4 +57,5 @@ def test_a_follower_of_n2_at_another_rate_is_named() -> None:
         bus.now += 100 * MS
     said = bus.findings("n2")["LN204"]
     assert "about 4800 Bd" in said
-    assert "10 of them in place of the answers of station 3" in said
+    assert said.startswith("station 3: ")
+    assert "10 of them in place of its answers" in said
