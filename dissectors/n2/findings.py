@@ -59,7 +59,7 @@ class N2Findings:
         self.stations: dict[int, N2StationRecord] = {}
         self.master = Damages()
         self._asked: dict[int, OpenCommand] = {}  # by transaction
-        self.masters = Masters()
+        self.masters = Masters(timing.char)
         self.patience = Patience(has_times=timing.has_times)
         self.clocked = Clocked()
         self.torn = TornFrames(timing)

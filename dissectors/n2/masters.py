@@ -40,8 +40,9 @@ class OpenCommand:
 
 @dataclass(slots=True)
 class Masters:
-    """Fed the commands; `seen` counts what one master would not do."""
+    """Fed the commands; `seen` counts what one master would not do. `char`: ns that a character takes."""
 
+    char: int
     seen: Tally = field(default_factory=Tally)
     _last: OpenCommand | None = None  # the newest command, while nothing has come after it
 
@@ -63,6 +64,8 @@ class Masters:
             return
         if not frame.ok or last.command.address == BROADCAST:
             return
+        if frame.end - frame.start > 2 * len(frame.octets) * self.char + frame.slack:
+            return  # a silence is in it: behind an echo that was cut short an `A` is its check by chance
         if frame.octets[:_SAME] == asked.frame.octets[:_SAME]:  # a repeat, or an echo that something ran into
             return
         if station is None or station.quickest is None or station.answered < KNOWN:

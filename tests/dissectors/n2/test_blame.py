@@ -81,7 +81,7 @@ def asked(octets: bytes, start: int, damage: Damage | None = None) -> OpenComman
 
 
 def seen(*commands: OpenCommand, quickest: int | None = 50 * MS, answered: int = 20) -> int:
-    masters = Masters()
+    masters = Masters(MS)
     for command in commands:
         masters.see_command(command, N2StationRecord(answered=answered, quickest=quickest))
     return masters.seen.count
@@ -101,7 +101,7 @@ def test_a_command_in_the_middle_of_another_is_not_the_same_masters():
 
 
 def test_something_between_two_commands_may_have_been_an_answer():
-    masters, station = Masters(), N2StationRecord(answered=20, quickest=50 * MS)
+    masters, station = Masters(MS), N2StationRecord(answered=20, quickest=50 * MS)
     masters.see_command(asked(READ, 0), station)
     masters.see_other()
     masters.see_command(asked(OTHER, 20 * MS), station)

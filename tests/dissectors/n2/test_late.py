@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import pytest
 
+from dissectors.frame import Chunk
+from dissectors.line import MS
 from dissectors.n2.envelope import make_answer, make_command
 from dissectors.n2.masters import Masters
 from dissectors.n2.record import N2StationRecord
 from dissectors.tracker import Interval, Transaction, Verdict
-from tests.dissectors.n2.heard import in_turns, warned_of
+from tests.dissectors.n2.heard import BEGIN, LINE, in_turns, warned_of
 
 SPOILT = b">031102@\x08140000E9\r"
 """A command to 3 that an answer fell on."""
@@ -46,7 +48,21 @@ def test_a_master_that_asks_for_the_next_point_soon_had_its_answer(wait: int, is
 def test_who_had_something_before_it_went_on_is_no_second_master(response: int, is_told: bool) -> None:
     """A command in row 40, one in row 41, and 20 ms after the first its answer; or a late one of an earlier command
     between the two, which the master took for its answer."""
-    masters, took = Masters(), Interval(20_000_000, 20_000_000, 20_000_000)
+    masters, took = Masters(1_000_000), Interval(20_000_000, 20_000_000, 20_000_000)
     late = Transaction(1, 3, "poll", 40, response, Verdict.LATE, 0, took.nominal, took)
     masters.see_late(late, N2StationRecord(answered=20))
     assert bool(masters.seen.count) is is_told
+
+
+def test_an_answer_that_ends_a_cut_echo_by_chance_shows_no_second_master() -> None:
+    """Echoes lack their last two characters, and the check of one command ends with the `A` that answers it."""
+    commands = [make_command(f"01110{point}03") for point in (1, 2, 3)]
+    ends_so = next(one for one in (make_command(f"01120{point:X}03") for point in range(1, 16)) if one[-2:] == b"A\r")
+    now, chunks = BEGIN, []
+    for turn in range(60):
+        command = ends_so if turn % 4 == 3 else commands[turn % 4]
+        answer = b"A\r" if turn % 4 == 3 else make_answer("0041A00000")
+        for octets, silence in ((command, 30), (command[:-2], 1), (answer, 65)):
+            now += silence * MS + len(octets) * LINE.char
+            chunks.append(Chunk(now, octets))
+    assert "N2007" not in {code for code, _ in warned_of(chunks)}
