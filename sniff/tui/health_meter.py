@@ -10,7 +10,8 @@ from sniff.bus.rows import Store
 PERIOD = 2.0
 """Seconds between two looks while rows keep coming: the rules have to be asked for it."""
 LEAST_FRAMES = 20
-"""Frames from which on a bus has a health: one damaged frame of three says nothing."""
+"""Frames from which on a bus that goes on has a health: one damaged frame of three says nothing yet. A capture that is
+whole has the one that every command tells."""
 
 
 class HealthMeter:
@@ -28,7 +29,7 @@ class HealthMeter:
         now = time.monotonic()
         if now - self._looked < PERIOD and not final:
             return self.report
-        if store.summary.load.total.frames < LEAST_FRAMES:
+        if store.summary.load.total.frames < LEAST_FRAMES and not final:
             return None
         self._looked, self._version = now, store.version
         self.report = store.model.health()

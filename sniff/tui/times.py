@@ -8,6 +8,8 @@ from enum import Enum
 from dissectors.line import MS, NS_PER_S
 from dissectors.words import bare_milliseconds
 
+UNTIMED = "not known: the log does not say when anything came"
+"""Of a capture whose octets are laid one behind the other (`Session.has_times`)."""
 LEAST = 5_000
 """ns; what is shorter would be written as 0.00 ms."""
 UNTOLD = 0.012

@@ -148,7 +148,7 @@ class FindingsScreen(SearchScreen):
             "about": Text(sanitized(finding.subject)),
             "what was seen": Text(fit(sanitized(finding.seen), room).rstrip()),
             "times": Text("" if finding.is_once else str(finding.count), justify="right"),
-            "last": Text(clock(finding.last)),
+            "last": Text(clock(finding.last) if self.store.session.has_times else "–"),
             "code": Text(finding.code, style="dim"),
         }
         return [cells[name] for name in self._columns()]
@@ -190,12 +190,13 @@ class FindingsScreen(SearchScreen):
         text = Text()
         if finding.cause is not None:
             text.append("from   ", style="dim").append(sanitized(" ".join(reversed(finding.cause))) + "\n")
-        span = (
-            clock(finding.first) if finding.first == finding.last else f"{clock(finding.first)} … {clock(finding.last)}"
-        )
-        text.append("when   ", style="dim").append(span)
+        if self.store.session.has_times:
+            first, last = clock(finding.first), clock(finding.last)
+            span = first if finding.first == finding.last else f"{first} … {last}"
+            text.append("when   ", style="dim").append(f"{span}\n")
         if finding.evidence:
-            text.append("\nframes ", style="dim").append_text(self._frames(finding.evidence))
+            text.append("frames ", style="dim").append_text(self._frames(finding.evidence))
+        text.rstrip()
         return text
 
     def _frames(self, evidence: tuple[int, ...]) -> Text:
@@ -213,7 +214,7 @@ class FindingsScreen(SearchScreen):
 
     def _place(self, no: int) -> str:
         row = self.store.by_no(no)
-        return f"{no}" if row is None else f"{no} at {clock(row.event.start)}"
+        return f"{no} at {clock(row.event.start)}" if row is not None and self.store.session.has_times else f"{no}"
 
     def _here(self) -> Finding | None:
         key = self.query_one(StationTable).key_here()

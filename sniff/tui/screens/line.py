@@ -20,13 +20,13 @@ from dissectors.words import milliseconds
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.feed import FeedStatus
 from sniff.bus.rows import Store
-from sniff.engine.session import LineEvent
+from sniff.engine.session import LineEvent, Session
 from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import spread
 from sniff.tui.key_names import named
 from sniff.tui.plot import LEAST, HistoryPlot
 from sniff.tui.screens.base import ViewScreen
-from sniff.tui.times import clock, date_and_clock, size
+from sniff.tui.times import UNTIMED, clock, date_and_clock, size
 
 EVENTS_SHOWN = 200
 STEPS = 240
@@ -59,12 +59,21 @@ def settings(store: Store, status: FeedStatus) -> list[Part]:
     held = f"holds octets back up to {milliseconds(adapter.latency)} ({sanitized(adapter.latency_from)})"
     return [
         ("line", Text(f"{sanitized(session.line)} · {characters}")),
-        ("adapter", Text(f"{names} · {held if adapter.latency else 'times are exact'}")),
+        (
+            "adapter",
+            Text(f"{names} · {held if adapter.latency else 'times are exact'}" if session.has_times else names),
+        ),
         ("reports", Text(reports(store))),
-        ("started", Text(date_and_clock(session.started) if session.started else "unknown")),
+        ("started", Text(_started(session))),
         ("capture", Text(capture(status))),
         *([("memory", Text(kept(store, status)))] if store.dropped_rows else []),
     ]
+
+
+def _started(session: Session) -> str:
+    if not session.has_times:
+        return UNTIMED
+    return date_and_clock(session.started) if session.started else "unknown"
 
 
 def reports(store: Store) -> str:
@@ -143,6 +152,8 @@ Curve = list[tuple[int, float]]
 def load(store: Store) -> list[Part]:
     """How busy the bus is."""
     known = store.load
+    if not store.session.has_times:
+        return []
     return [("load", Text(f"{known.share():.0%} now, {known.overall():.0%} overall"))]
 
 
@@ -150,7 +161,7 @@ def curves(store: Store, most: int) -> tuple[Curve, Curve]:
     """The load, %, and errors a second, of all seconds that are known, in `most` steps at most; the last step is left
     out where it is not over."""
     seconds = store.load.seconds
-    if not seconds:
+    if not seconds or not store.session.has_times:
         return [], []
     first, last = min(seconds), max(seconds)
     step = -(-(last - first + 1) // most)
@@ -166,6 +177,8 @@ def curves(store: Store, most: int) -> tuple[Curve, Curve]:
 
 def gaps(store: Store, width: int) -> list[Part]:
     """How long the line was silent between frames, from first to last range that occurred."""
+    if not store.session.has_times:
+        return []
     held = store.session.adapter.latency
     doubt = f", right to ±{milliseconds(held)}" if held else ""
     text = Text(f"between frames, {store.gaps.count} times{doubt}")
@@ -174,13 +187,14 @@ def gaps(store: Store, width: int) -> list[Part]:
     return [("silence", text)]
 
 
-def events(happened: list[LineEvent]) -> list[Part]:
-    """What happened to the line, the newest first."""
+def events(happened: list[LineEvent], has_times: bool = True) -> list[Part]:
+    """What happened to the line, the newest first; when, where that is known."""
     lines = []
     for event in reversed(happened[-EVENTS_SHOWN:]):
         count = f" {event.number}" if event.number > 0 else " (how many is unknown)" if event.number < 0 else ""
         words = f": {sanitized(event.text)}" if event.text else ""
-        lines.append(f"{clock(event.moment)}  {event.kind.value}{count}{words}")
+        when = f"{clock(event.moment)}  " if has_times else ""
+        lines.append(f"{when}{event.kind.value}{count}{words}")
     if len(happened) > EVENTS_SHOWN:
         lines.append(f"and {len(happened) - EVENTS_SHOWN} earlier ones")
     return [("events", Text("\n".join(lines or [NO_EVENTS])))]
@@ -244,7 +258,7 @@ class LineScreen(ViewScreen):
             "errors": errors(store, analyzer(self).status),
             "load": load(store),
             "gaps": gaps(store, width),
-            "events": events(store.line_events),
+            "events": events(store.line_events, store.session.has_times),
         }
         for name, parts in sections.items():
             self.query_one(f"#{name}", Static).update(_table(parts))

@@ -190,7 +190,7 @@ class NodesScreen(SearchScreen):
         self._lay_out(table, stations)
         table.fill((key, self._cells(one)) for key, one in self._stations.items())
         latency = self.store.session.adapter.latency
-        doubt = f" · times ±{milliseconds(latency)}" if latency else ""
+        doubt = f" · times ±{milliseconds(latency)}" if latency and self.store.session.has_times else ""
         said = still_judging(analyzer(self).status, self.store)
         legend = f"{len(stations)} stations, sorted by {title}{doubt}" + (f" · {said}" if said else "")
         self.query_one("#legend", Static).update(legend)
@@ -261,7 +261,7 @@ class NodesScreen(SearchScreen):
             text.append("\nerrors  ", style="dim").append(sanitized(", ".join(named)))
         if node.passed:
             text.append("\ntokens  ", style="dim").append(
-                f"{node.passed} tokens and polls for masters came to it"
+                f"{counted(node.passed, 'token or poll', 'tokens and polls')} for masters came to it"
                 + (f"; {counted(node.unused, 'token')} of those it did not use" if node.unused else "")
             )
         if node.latency.count:
@@ -280,7 +280,8 @@ class NodesScreen(SearchScreen):
         text = Text().append("\nis asked for", style="dim")
         for poll in shown:
             often = "once" if poll.asked + poll.repeats == 1 else f"{poll.asked + poll.repeats} times"
-            every = "" if poll.interval is None else f" every {interval(poll.interval)} ms"
+            is_timed = poll.interval is not None and self.store.session.has_times
+            every = "" if not is_timed else f" every {interval(poll.interval)} ms"
             said = asked(poll, self.store.devices, self.size.width - 40) or poll.key.kind
             bad = f", {poll.unanswered} without answer" if poll.unanswered else ""
             line = fit(sanitized(f"{often + every:>25}  {said}{bad}"), self.size.width - SIDES)

@@ -11,6 +11,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.widgets import DataTable, Static
 
+from dissectors.findings import counted
 from dissectors.line import NS_PER_S
 from dissectors.profiles.decoding import Quality, Value, number
 from sniff.analysis.guessed_points import GuessedPoint, LatestGuesses, guess_of
@@ -22,7 +23,7 @@ from sniff.tui.plot import HistoryPlot
 from sniff.tui.screens.tabling import TableScreen
 from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
-from sniff.tui.times import interval, jitter
+from sniff.tui.times import UNTIMED, interval, jitter
 
 SHOWN = 500
 """Points in the table at most."""
@@ -171,13 +172,13 @@ class PointsScreen(TableScreen):
             return
         self._drawn = state
         newest = self.store.by_no(self.store.last_no)
-        now = newest.event.end if newest is not None else 0
+        now, has_times = newest.event.end if newest is not None else 0, self.store.session.has_times
         guesses = self._guesses.of(self.store.points, self.store.model.series)
         told = [(point, guesses.get(_place(point)) if point.entry is None else None) for point in self._chosen()]
         points = [(point, guess) for point, guess in told if guess is None or not guess.is_covered]
         room = WORDS if self._columns == WIDE else self._room([point for point, _ in points[:SHOWN]], now)
         self.query_one(StationTable).fill(
-            (_key(point), _cells(point, now, self._pinned, guess, room)[: len(self._columns)])
+            (_key(point), _cells(point, now, self._pinned, guess, room, has_times)[: len(self._columns)])
             for point, guess in points[:SHOWN]
         )
         self._hidden = max(0, len(points) - SHOWN)
@@ -256,7 +257,7 @@ class PointsScreen(TableScreen):
         guess = self._guess(point)
         if guess is not None:
             words.append(guess.words + ("" if guess.value is None else f", so read {guess.value:.7g}"))
-        words += _seen(point, guess)
+        words += _seen(point, guess, self.store.session.has_times)
         words.append(f"row {point.sample.frame}")
         return sanitized(" · ".join(word for word in words if word) + f" · {self.said}" + self._more())
 
@@ -305,12 +306,16 @@ class PointsScreen(TableScreen):
 
     def action_plot(self) -> None:
         """The plot or not."""
+        if not self.store.session.has_times:
+            self.notify(f"when values came is {UNTIMED}", timeout=4)
+            return
         self._plotted = not self.query_one(HistoryPlot).display
         self._show_plot(self._plotted)
         self._draw_detail()
 
     def _show_plot(self, shown: bool) -> None:
         """With a plot the table is no longer than its rows, and the plot takes the rest."""
+        shown = shown and self.store.session.has_times
         self.query_one(HistoryPlot).display = shown
         self.set_class(shown, "-plotted")
 
@@ -325,10 +330,10 @@ class PointsScreen(TableScreen):
         self.draw()
 
 
-def _seen(point: Point, guess: GuessedPoint | None) -> list[str]:
+def _seen(point: Point, guess: GuessedPoint | None, has_times: bool) -> list[str]:
     """How often, how it moved, who wrote it."""
-    samples = f"{point.count} samples"
-    if point.interval is not None:
+    samples = counted(point.count, "sample")
+    if point.interval is not None and has_times:
         samples += f" every {interval(point.interval)} ms"
         samples += f" ±{jitter(point.jitter, point.interval)}" if point.jitter is not None else ""
     words = [samples]
@@ -337,7 +342,7 @@ def _seen(point: Point, guess: GuessedPoint | None) -> list[str]:
         low = high = rate = None
     if low is not None and high is not None and low != high:
         words.append(f"seen {low:.7g} … {high:.7g}")
-    if rate:
+    if rate and has_times:
         words.append(f"moves {rate:.3g} a second")
     if point.written:
         words.append(f"written {point.written} times" if point.written > 1 else "written once")
@@ -352,7 +357,9 @@ def _key(point: Point) -> str:
     return "/".join(_place(point))
 
 
-def _cells(point: Point, now: int, pinned: list[Key], guess: GuessedPoint | None, room: int) -> list[Text]:
+def _cells(
+    point: Point, now: int, pinned: list[Key], guess: GuessedPoint | None, room: int, has_times: bool
+) -> list[Text]:
     sample, value, entry = point.sample, point.sample.value, point.entry
     is_number = not value.words  # of states and flags the numbers between say nothing
     shown, low, high = shown_value(value, room), point.low, point.high
@@ -360,17 +367,17 @@ def _cells(point: Point, now: int, pinned: list[Key], guess: GuessedPoint | None
     if guess is not None and guess.value is not None and not guess.is_itself:
         shown, low, high, quality = f"{guess.value:.7g}", guess.low, guess.high, MARKS[Quality.UNCERTAIN]
     mark = ("^" if _place(point) in pinned else "") + ("→" if point.is_command else "") + quality
-    fresh = bool(point.changed) and now - point.changed <= FRESH
+    fresh = has_times and bool(point.changed) and now - point.changed <= FRESH
     style = "bold" if fresh else ""
     return [
         Text(mark),
         Text(sample.station, justify="right"),
         Text(sanitized(sample.name)),
         Text(("*" if fresh else "") + shown, style=style, justify="right"),
-        Text(age(now - sample.time), justify="right"),
+        Text(age(now - sample.time) if has_times else "–", justify="right"),
         Text(str(point.count), justify="right"),
-        Text(interval(point.interval), justify="right"),
-        Text(jitter(point.jitter, point.interval), justify="right"),
+        Text(interval(point.interval if has_times else None), justify="right"),
+        Text(jitter(point.jitter, point.interval) if has_times else "–", justify="right"),
         Text(f"{low:.5g}" if low is not None and is_number else "–", justify="right"),
         Text(f"{high:.5g}" if high is not None and is_number else "–", justify="right"),
         Text(trend([number for _, number in point.history])),

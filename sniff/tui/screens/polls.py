@@ -70,6 +70,8 @@ MOST: tuple[tuple[str, Cell], ...] = (
 """Columns of the widest screens, which have a chart too."""
 WIDEST = 160
 OFTEN = "how often"
+OF_TIME = {"every ms", "±", "first", "last"}
+"""Columns that say nothing of a capture without times."""
 TROUBLE = {"none", "exc.", "late", "dam."}
 """Columns where anything is worth a look: such cells get a "!"."""
 
@@ -187,12 +189,17 @@ class PollsScreen(TableScreen):
         cells = [
             Text(_who(poll), justify="right"),
             Text(said),
-            *(count_cell(of(poll), title in TROUBLE) for title, of in self._columns),
+            *(count_cell("–" if self._is_untold(title) else of(poll), title in TROUBLE) for title, of in self._columns),
         ]
         return [*cells, Text(self._small(key, poll, span))] if is_widest else cells
 
+    def _is_untold(self, title: str) -> bool:
+        return title in OF_TIME and not self.store.session.has_times
+
     def _small(self, key: str, poll: Poll, span: tuple[int, int]) -> str:
         """The chart of a line, which is only drawn anew where something came."""
+        if not self.store.session.has_times:
+            return ""
         state = poll.asked + poll.repeats, *span
         drawn = self._charts.get(key)
         if drawn is None or drawn[0] != state:
@@ -205,7 +212,8 @@ class PollsScreen(TableScreen):
         more = f" · {self._hidden} more are not shown" if self._hidden else ""
         summary = f"{len(self._shown)} requests, {self.said}{more}"
         self.query_one("#detail", Static).update("\n".join(part for part in (*said, summary, open_end) if part))
-        self.query_one("#chart", Static).update("" if poll is None else self._chart(poll))
+        is_drawn = poll is not None and self.store.session.has_times
+        self.query_one("#chart", Static).update(self._chart(poll) if poll is not None and is_drawn else "")
 
     def _detail(self, poll: Poll) -> str:
         key = poll.key
@@ -220,6 +228,8 @@ class PollsScreen(TableScreen):
         if poll.latency.count:
             low, high = poll.latency.quantile(0.5), poll.latency.most
             words.append(f"answers after {milliseconds(low or 0)}, at most {milliseconds(high or 0)}")
+        if not self.store.session.has_times:
+            return sanitized(" · ".join(words))
         first, last = poll.first or 0, poll.last or 0
         words.append(f"{clock(first)} … {clock(last)}" if first != last else clock(first))
         begin, end = self._span()

@@ -30,7 +30,7 @@ from sniff.tui.timeline_picture import (
     seconds_in_words,
     widths,
 )
-from sniff.tui.times import clock
+from sniff.tui.times import UNTIMED, clock
 
 LOADS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.75, 1.0)
 """Where the axis of the load may end."""
@@ -137,6 +137,9 @@ class TimelineScreen(ViewScreen):
             return
         self._drawn = state
         chart = self.query_one("#main", Static)
+        if not self.store.session.has_times:
+            chart.update(f"when it was is {UNTIMED}")
+            return
         first, last = self._span()
         if first is None or last is None:
             chart.update("nothing was heard yet" if analyzer(self).status.live else "no frames in this file")
@@ -234,7 +237,7 @@ class TimelineScreen(ViewScreen):
 
     def _span(self) -> tuple[int | None, int | None]:
         load = self.store.load
-        if load.first is None or load.last is None:
+        if load.first is None or load.last is None or not self.store.session.has_times:
             return None, None
         return load.first // NS_PER_S, load.last // NS_PER_S
 

@@ -133,18 +133,19 @@ class Bus:
         self,
         station: int = 1,
         verdict: Verdict | None = Verdict.ANSWERED,
-        latency: float = 8.2,
+        latency: float | None = 8.2,
         values: bytes = b"\x12\x34\x56",
         marks: tuple[Mark, ...] = (),
         damage: Damage | None = None,
         **more: Any,
     ) -> Transaction | None:
-        """One exchange; without response for verdicts that have none; still open for None."""
+        """One exchange; without response for verdicts that have none; still open for None. `latency`: ms, None where
+        nobody knows it."""
         self.tx += 1
         request = self.row(self.frame(bytes([station, 3, 0, 7, 99])), self.tx, Role.REQUEST)
         rows = [request]
         asked = self.now
-        self.now += int(latency * MS)
+        self.now += int((latency or 0) * MS)
         response = None
         if verdict not in (Verdict.NO_RESPONSE, None):
             event = self.frame(bytes([station, 3, *values, 77]), damage, marks)
@@ -154,7 +155,8 @@ class Bus:
         held = self.store.session.adapter.latency
         closed = ()
         if verdict is not None:
-            span = Interval(int(latency * MS), int(latency * MS), int(latency * MS) + held) if response else None
+            took = None if latency is None or response is None else int(latency * MS)
+            span = None if took is None else Interval(took, took, took + held)
             number = response.no if response else None
             closed = (
                 Transaction(
@@ -188,10 +190,15 @@ def _utc() -> Iterator[None]:
 
 @pytest.fixture
 def make_bus() -> Callable[..., Bus]:
-    """An empty bus: `make_bus(latency=ns held back, keep=rows kept)`."""
+    """An empty bus: `make_bus(latency=ns held back, keep=rows kept, said=who says so)`."""
 
-    def make(latency: int = 16 * MS, reports: tuple[str, ...] | None = ("parity", "framing"), keep: int = 10**6) -> Bus:
-        adapter = Adapter("FT232R", "ftdi_sio", latency, "latency timer", reports)
+    def make(
+        latency: int = 16 * MS,
+        reports: tuple[str, ...] | None = ("parity", "framing"),
+        keep: int = 10**6,
+        said: str = "latency timer",
+    ) -> Bus:
+        adapter = Adapter("FT232R", "ftdi_sio", latency, said, reports)
         session = Session("/dev/ttyUSB0", LineSettings.parse("19200,8E1"), "toy", START, adapter=adapter)
         return Bus(Store(session, TOY, keep))
 

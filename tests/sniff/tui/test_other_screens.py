@@ -119,7 +119,7 @@ def test_sorting(look: Any, busy_bus: Any) -> None:
         for _ in range(6):
             orders.append("".join(str(key.value) for key in see.main.rows))
             await see.press("s")
-        assert orders == ["4312", "1234", "4312", "2143", "4123", "4312"]
+        assert orders == ["4123", "1234", "4312", "2143", "4123", "4123"]
         assert "sorted by address" in see.text()
 
     look(busy_bus.store, script, start="nodes")
@@ -261,3 +261,19 @@ def test_the_curves_of_the_line_hold_all_that_was_heard(make_bus: Any) -> None:
     )
     few, _ = curves(store, 3)
     assert 1 <= len(few) <= 3
+
+
+def test_a_short_file_has_the_health_that_every_command_tells(look: Any, make_bus: Any) -> None:
+    """A bus that goes on has none before some frames were heard: one damaged of three says nothing yet."""
+    bus = make_bus()
+    bus.ask(1)
+    bus.ask(1, Verdict.EXCEPTION)
+    told = []
+
+    async def script(see: Any) -> None:
+        await see.poll()
+        told.append("health " in see.lines()[0])
+
+    for live in (False, True):
+        look(bus.store, script, start="nodes", live=live)
+    assert told == [True, False]
