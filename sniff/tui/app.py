@@ -96,6 +96,16 @@ class SnifferApp(Analyzer):
         self._asked_to_quit = 0.0
         self._pressed = 0.0  # when the last key was
 
+    @property
+    def broken_by(self) -> Exception | None:
+        """What ended it, where that was no user."""
+        return self._exception
+
+    def _fatal_error(self) -> None:
+        """Textual's page of a traceback is for nobody here: who runs this says it in a line, as of any command."""
+        self._begin_batch()  # nothing is painted over the terminal that is given back, as where a user ends it
+        self._close_messages_no_wait()
+
     def _take_themes(self) -> None:
         for theme in THEMES:
             self.register_theme(theme)
