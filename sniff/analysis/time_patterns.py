@@ -397,7 +397,8 @@ class TimePatterns:
             count=len(told),
             evidence=tuple(no for one, _ in told for no in one.rows),
         )
-        yield replace(finding, means=f"{finding.means}; {first.fit.means}") if first.fit is not None else finding
+        fit = f"; at those times {first.fit.means}" if first.fit is not None else ""
+        yield replace(finding, means=finding.means + fit)
 
     def _words_of(self, stretch: _Stretch) -> str:
         """Why the octets of a stretch are no noise; empty where they may be."""

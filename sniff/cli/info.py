@@ -230,7 +230,7 @@ def _print_nodes(summary: Summary) -> None:
             f"{node.sent} frames from, {node.received} to; {_listed(verdicts) if verdicts else 'nothing asked of it'}",
         )
         if node.errors:
-            _line("", _listed(node.errors))
+            _line("", _listed(node.errors, " × ", "; "))  # their words have numbers and commas in them
     polled, all_of_them = summary.nodes.absent(), _broadcasts(summary)
     if polled:
         _line("polled only", f"{spans(polled)}: never heard, never asked anything")
@@ -273,13 +273,13 @@ def _span(seconds: float) -> str:
     return f"{f'{hours} h ' if hours else ''}{rest // 60} min {rest % 60} s"
 
 
-def _listed(counts: Mapping[str, int]) -> str:
+def _listed(counts: Mapping[str, int], times: str = " ", between: str = ", ") -> str:
     """The commonest, and how many more there are."""
-    shown = [f"{count} {name}" for name, count in ranked(counts).items()]
+    shown = [f"{count}{times}{name}" for name, count in ranked(counts).items()]
     more = len(shown) - MOST_LISTED
     if more > 1:
         shown[MOST_LISTED:] = [f"… and {more} more"]
-    return ", ".join(shown) or "none"
+    return between.join(shown) or "none"
 
 
 def _counts(counts: Mapping[str, int]) -> str:

@@ -192,7 +192,7 @@ class NodesScreen(SearchScreen):
         latency = self.store.session.adapter.latency
         doubt = f" · times ±{milliseconds(latency)}" if latency and self.store.session.has_times else ""
         said = still_judging(analyzer(self).status, self.store)
-        legend = f"{len(stations)} stations, sorted by {title}{doubt}" + (f" · {said}" if said else "")
+        legend = f"{counted(len(stations), 'station')}, sorted by {title}{doubt}" + (f" · {said}" if said else "")
         self.query_one("#legend", Static).update(legend)
         self._describe()
 
@@ -257,8 +257,8 @@ class NodesScreen(SearchScreen):
                 ", ".join(f"{words} {count}" for words, count in spoilt.most_common())
             )
         if node.errors:
-            named = (f"{error} {count}" for error, count in node.errors.most_common(SOME))
-            text.append("\nerrors  ", style="dim").append(sanitized(", ".join(named)))
+            named = (f"{count} × {error}" for error, count in node.errors.most_common(SOME))
+            text.append("\nerrors  ", style="dim").append(sanitized("; ".join(named)))
         if node.passed:
             text.append("\ntokens  ", style="dim").append(
                 f"{counted(node.passed, 'token or poll', 'tokens and polls')} for masters came to it"

@@ -210,7 +210,7 @@ class PollsScreen(TableScreen):
         poll, open_end = self._here(), still_judging(analyzer(self).status, self.store)
         said = [self._detail(poll)] if poll is not None else ["nobody asked anything" + (" so" if self.words else "")]
         more = f" · {self._hidden} more are not shown" if self._hidden else ""
-        summary = f"{len(self._shown)} requests, {self.said}{more}"
+        summary = f"{counted(len(self._shown), 'request')}, {self.said}{more}"
         self.query_one("#detail", Static).update("\n".join(part for part in (*said, summary, open_end) if part))
         is_drawn = poll is not None and self.store.session.has_times
         self.query_one("#chart", Static).update(self._chart(poll) if poll is not None and is_drawn else "")

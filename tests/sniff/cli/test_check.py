@@ -128,3 +128,9 @@ def test_nothing_heard_has_the_time_of_the_capture(sniff485, tmp_path):
     found = [json.loads(line) for line in sniff485("check", "--json", path).out.splitlines()]
     assert {one["code"] for one in found} == {"LN001", "LN002"}
     assert {(one["first"], one["last_ns"]) for one in found} == {("2026-03-01T10:00:00.000000000Z", 0)}
+
+
+def test_what_is_so_for_a_while_is_not_said_of_the_bus(sniff485: Any) -> None:
+    path = Path(__file__).parents[3] / "captures" / "findings" / "line-a-drive-still-speaks-bacnet.cap.txt"
+    found = {one["code"]: one for one in map(json.loads, sniff485("check", "--json", path).out.splitlines())}
+    assert found["LN303"]["means"].endswith("; at those times the bus runs mstp")

@@ -26,3 +26,12 @@ def test_what_was_wrong_with_an_answer_is_said_of_who_answered(sniff485: Callabl
     assert [node["errors"] for node in told["nodes"]].count({}) >= 3
     told = json.loads(sniff485("info", "--json", *way, str(OURS / "n2-noisy-ftdi.cap.txt")).out)
     assert told["nodes"][0]["errors"]
+
+
+def test_how_often_an_error_was_is_told_from_the_numbers_in_it(sniff485: Callable[..., Any]) -> None:
+    path = OURS / "findings" / "line-a-drive-still-speaks-bacnet.cap.txt"
+    counts = json.loads(sniff485("info", "--json", path).out)["nodes"][0]["errors"]
+    said = sniff485("info", path).out
+    often = max(counts, key=lambda error: counts[error])
+    assert any(character.isdigit() for character in often)
+    assert f"{counts[often]} × {often}; " in said

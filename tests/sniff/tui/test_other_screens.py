@@ -96,7 +96,7 @@ def test_the_worst_station_stands_first_with_what_its_health_is_made_of(look: An
         assert "health  0 of 100: 100% of its requests without answer" in see.text()
         assert "health " in see.lines()[0]
         await see.press("down")
-        assert "errors  illegal data address 1" in see.text()
+        assert "errors  1 × illegal data address" in see.text()
 
     look(bus.store, script, start="nodes")
 
