@@ -124,7 +124,8 @@ class RingScreen(SearchScreen):
         rows = shown.rows(ring)
         self._fill(shown.headings, rows)
         self.query_one("#picture", Static).update("\n".join(self._picture(shown, ring, rows)))
-        said = Text("\n".join((*([open_end] if open_end else []), *shown.sentences(ring), "")))
+        units = self._units(shown.headings)
+        said = Text("\n".join((*([open_end] if open_end else []), *units, *shown.sentences(ring), "")))
         if self.size.height < TALL:
             said.append("\n?: what the titles mean")
         else:
@@ -132,6 +133,11 @@ class RingScreen(SearchScreen):
                 if not {BARS, *self._titles}.isdisjoint(title.split()):
                     said.append(f"\n{title:<12}", style="bold").append(means, style="dim")
         words.update(hanging(said, self.app.size.width - SIDES, INDENT))
+
+    def _units(self, headings: Sequence[str]) -> list[str]:
+        """Which of the short titles are times; the full ones say it themselves."""
+        short = [SHORT[name] for name in headings if name.endswith(" ms") and SHORT.get(name) in self._titles]
+        return [f"{', '.join(short)}: ms"] if short else []
 
     def _fill(self, headings: Sequence[str], rows: list[tuple[Cell, ...]]) -> None:
         roomy = self.app.size.width >= ROOMY

@@ -86,3 +86,13 @@ def test_bit_fields_share_their_octet(busy_bus: Any) -> None:
     assert found["rest"] == (3, 5)
     assert found["[1]"] == (4, 5)
     assert found["sum"] == (5, 6)
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 40), (300, 60)])
+def test_times_of_a_ring_have_their_unit(look: Any, stores: dict[str, Store], size: tuple[int, int]) -> None:
+    async def script(see: Any) -> None:
+        titles = next(line for line in see.lines() if "loop" in line and "next" in line)
+        assert ("loop p50 ms" in titles) is (size[0] >= 280)
+        assert ("loop, max, use95, repl95: ms" in see.text()) is (size[0] < 280)
+
+    look(stores["mstp"], script, size=size, start="ring")
