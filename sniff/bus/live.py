@@ -2,8 +2,8 @@
 
 Reads are gathered and looked at together, all that has come at once: a frame is shown as soon as it is known to be one,
 and a busy bus costs little more than a quiet one. The engine may be behind what comes, without harm to the recording.
-It is never let run for long at a time, so that whoever shows it can draw, and once the capture is over what is left
-gets a second: its octets are counted as `unseen`.
+It is never let run for long at a time, so that whoever shows it can draw, and once the capture is over, or was asked to
+end, what is left gets a second, of all buses together: octets beyond that are counted as `unseen`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,10 @@ AT_ONCE = 0.2
 """Seconds that one `poll` may spend with the engine."""
 
 TO_THE_END = 1.0
-"""Seconds that the engine gets for what had come when the capture ended."""
+"""Seconds that the engines get for what had come when the capture ended, or was asked to."""
+
+LATE_MOST = 16 << 10
+"""Octets that are looked at all the same after that: the last ones of a capture that took its time to end."""
 
 PIECE = 8192
 """Octets that are not gathered any further: so many are given to the engine at a time."""
@@ -117,7 +120,7 @@ class LiveBus:
         self._gathered_since = 0  # when the first of them came, ns
         self._now: int | None = None  # up to when all that was heard has come here
         self._patience = 0 if watched else UNWATCHED
-        self._leave_at: float | None = None  # when what is pending is not looked at any more
+        self._late = 0  # octets looked at although their time is over
         self._skipped = 0
         self._values = RecordedValues(self.session.bus, self.dissector, self.devices) if link.paths else None
         self._nodes_budget = Budget(NODES_A_SECOND, NODES_AT_ONCE)
@@ -186,14 +189,18 @@ class LiveBus:
         self._router.insist()
         until = time.monotonic() + AT_ONCE
         while self._pending:
-            if self.link.closing and self._leave_at is None:
-                self._leave_at = time.monotonic() + TO_THE_END
-            if self._leave_at is None and time.monotonic() >= until:
+            if not self._is_late and time.monotonic() >= until:
                 break
             items += self._next()
-            if not self._pending and self._leave_at is not None:  # the end is near: go there
+            if not self._pending and self.link.over_since is not None:  # the end is near: go there
                 self._pending.extend(self._router.receive(self.bus))
         return items if self.ended is not None else [*items, *self._up_to_now()]
+
+    @property
+    def _is_late(self) -> bool:
+        """Whether what is pending has had its time."""
+        since = self.link.over_since
+        return since is not None and time.monotonic() >= since + TO_THE_END
 
     def _next(self) -> list[LiveTables]:
         """Take the next message; once the time is over, reads are only counted."""
@@ -203,9 +210,11 @@ class LiveBus:
             return self._take(message)
         if message.bus != self.bus:  # type: ignore[union-attr]
             return []
-        if self._leave_at is not None and time.monotonic() >= self._leave_at:
-            self._skipped += octets
-            return []
+        if self._is_late:
+            self._late += octets
+            if self._late > LATE_MOST:
+                self._skipped += octets
+                return []
         if self._values is not None:
             self._values.hear(octets, len(message.block) if isinstance(message, HeardOctets) else 1)
         if self.engine.searching:

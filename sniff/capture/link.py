@@ -81,7 +81,8 @@ class CaptureLink:
     One thread at a time may use it. `pid`: of the capture process. `priority`: what it was granted. `clock`: its
     clock. `paths`: the files that it records to at first. `derived_dropped`: results that did not go back in time.
     `dropped`: octets of each bus that came here and were not given out, because the caller did not keep up. `closing`:
-    whether the end of the capture has come here, although other things may wait before it.
+    whether the end of the capture has come here, although other things may wait before it. `over_since`: when that
+    was, or when it was asked to end, s of the monotonic clock; None before.
     """
 
     def __init__(self, spawned: Spawned) -> None:
@@ -100,6 +101,7 @@ class CaptureLink:
         self._told_to_end = 0  # how hard
         self._malformed: IpcError | None = None
         self.closing = False
+        self.over_since: float | None = None
         self._unsent = bytearray()
         self._sessions: list[Session] = []
         self.pid = process.pid
@@ -221,8 +223,13 @@ class CaptureLink:
         except IpcError as error:
             self._malformed = error
             alive = False
-        self.closing = self.closing or not alive
+        if not alive:
+            self._close()
         return alive
+
+    def _close(self) -> None:
+        self.closing = True
+        self.over_since = self.over_since or time.monotonic()
 
     @property
     def _silent(self) -> float:
@@ -285,7 +292,7 @@ class CaptureLink:
                 for message in MessageSplitter().feed(encode_item(bus, event)):
                     self._add(*message)
         elif kind == IpcKind.ENDED:
-            self.closing = True
+            self._close()
         self._add(kind, bus, body)
 
     def _add(self, kind: int, bus: int, body: bytes) -> None:
@@ -353,6 +360,7 @@ class CaptureLink:
         """Have the capture end; Ended comes when its files are closed. Asked again, it no longer waits for the disk."""
         if self.ended is None:
             self._stops += 1
+            self.over_since = self.over_since or time.monotonic()
             self._told_to_end = 0
             self._heard_at = time.monotonic()
             self._unsent += encode(IpcKind.STOP)

@@ -265,6 +265,7 @@ class SimLink:
         self.paths = [str(recorder.path) for recorder in recorders]
         self.dropped: dict[int, int] = {}
         self.closing = False
+        self.over_since: float | None = None
         self.ended: Ended | None = None
         self.killed = False
         self._messages: list[Batch] = []

@@ -50,6 +50,7 @@ class Link:
 
     priority = ""
     closing = False
+    over_since = None
     ended = None
 
     def __init__(self, recorder: Recorder, wanted: Callable[[str], bool]) -> None:

@@ -17,6 +17,7 @@ class GivenLink:
         self.messages, self.paths = list(messages), list(paths)
         self.line = LineSettings.parse(line)
         self.priority, self.closing = "", False
+        self.over_since: float | None = None
         self.dropped: dict[int, int] = {}
         self.ended: Ended | None = None
         self.told: list[tuple[Any, ...]] = []
