@@ -20,7 +20,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dissectors.line import MS, LineSettings
+from dissectors.line import MS, NS_PER_S, LineSettings
 
 LOOKED_AT = 2048
 """Reads of a capture that are looked at."""
@@ -30,6 +30,9 @@ PERIODS = (64, 50, 40, 32, 25, 20, 16, 12, 10, 8, 6, 5, 4, 3, 2, 1)
 
 FULL_PACKETS = (62, 64)
 """Octets of a USB packet that is full and does not wait for the timer."""
+
+LEAST_ROUNDED = 3
+"""Intervals of which each is a whole number of tenths of milliseconds, which unrounded times hardly give."""
 
 LEAST_INTERVALS = 12
 FEW_INTERVALS, LONG_PERIOD = 5, 10
@@ -73,8 +76,19 @@ class ReadTimes:
         return cls(tuple(intervals), tuple(octets))
 
     @property
+    def told(self) -> int:
+        """How many intervals there are, of reads that are not at once."""
+        return sum(interval > 0 for interval in self.intervals)
+
+    @property
     def unit(self) -> int:
-        """What all intervals are multiples of, ns: 1, 10, 100 … 1 ms; what is finer was rounded away."""
+        """What all intervals are multiples of, ns: 1, 10, 100 … 1 ms; what is finer was rounded away. A second, where
+        reads of the same one show that it is not their rhythm.
+        """
+        known = [interval for interval in self.intervals if interval >= 0]
+        at_once = sum(not interval for interval in known)
+        if len(known) >= LEAST_ROUNDED and 3 * at_once >= len(known) and not any(one % NS_PER_S for one in known):
+            return NS_PER_S
         unit = MS
         for interval in self.intervals:
             while unit > 1 and interval > 0 and interval % unit:
@@ -106,9 +120,9 @@ def held_back(reads: ReadTimes, line: LineSettings, bound: int = 0) -> HeldBack:
     hurried = 0 if bound else _hurried(reads, line.char)
     proved = max(proved, hurried)
     period, scatter = _grid(reads, line.char)
+    rounded = reads.unit if reads.unit >= MS // 10 and reads.told >= LEAST_ROUNDED else 0
     if not period and not proved:
-        return EXACT
-    rounded = reads.unit if reads.unit >= MS // 10 else 0
+        return HeldBack(rounded) if rounded else EXACT
     latency = period + USB_FRAME + 2 * scatter + rounded if period else 0
     if proved > latency:
         latency = next((b * MS for b in _BOUNDS if 4 * b * MS >= 5 * proved), _BOUNDS[-1] * MS)

@@ -13,7 +13,7 @@ from typing import Final
 
 from dissectors import registry
 from dissectors.frame import Chunk
-from dissectors.line import MS, LineSettings, Timing
+from dissectors.line import MS, NS_PER_S, LineSettings, Timing
 from sniff.engine.read_times import ReadTimes, held_back
 
 DEVICES_NOTE = "devices"
@@ -62,6 +62,9 @@ SECOND_NOTE = "second protocol"
 
 INFERRED = "inferred from the reads"
 """Where a latency is from that nobody said."""
+
+COARSE = f"{INFERRED}, whose times are whole seconds"
+"""The same of a file whose times count seconds."""
 
 NO_TIMES = "assumed; the log has no times"
 NO_TIMES_OF_PACKETS = "assumed; its packets have no times"
@@ -115,6 +118,8 @@ class Session:
         several reads that hold more octets than can have come: a single one is a computer that was busy.
         """
         said = self.said or self.adapter
+        if self.reads is not None and said.latency_from in UNNAMED and self._is_coarse:
+            return replace(self, adapter=replace(said, latency=self.reads.unit, latency_from=COARSE), said=said)
         if self.reads is None or "line" in self.unknown or self.line_is_assumed:
             return self
         told = held_back(self.reads, self.line, said.latency)
@@ -123,10 +128,19 @@ class Session:
             return replace(self, adapter=said, said=None)
         if told.latency <= said.latency:
             return replace(self, adapter=said, said=None)
-        why = INFERRED
+        why = (
+            INFERRED
+            if told.period or told.proved
+            else f"{INFERRED}, whose times are multiples of {told.latency / MS:g} ms"
+        )
         if is_named:
             why += f", which hold more octets than {said.latency / MS:.3g} ms ({said.latency_from}) allow"
         return replace(self, adapter=replace(said, latency=told.latency, latency_from=why), said=said)
+
+    @property
+    def _is_coarse(self) -> bool:
+        """Whether the times of the file count seconds."""
+        return self.reads is not None and self.reads.unit == NS_PER_S
 
     @property
     def line_is_assumed(self) -> bool:

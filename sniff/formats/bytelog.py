@@ -38,7 +38,7 @@ from sniff.formats.log_pieces import lines_in, rows_in
 from sniff.formats.log_plan import LOOKED_AT, LOOKED_AT_CHARACTERS, Plan, plan_of
 from sniff.formats.log_shapes import DECODED, REMARK
 from sniff.formats.octet_table import TableLayout, delimiter_of, heading_of
-from sniff.formats.records import FOREIGN_LATENCY, foreign_session
+from sniff.formats.records import foreign_session
 from sniff.formats.timeless import LINE_END, SLOW
 
 if TYPE_CHECKING:
@@ -55,6 +55,9 @@ _SAYS = 30
 
 _RULED = re.compile(r"[\s+|:=-]*")
 """What stands between the rows of a table that is drawn."""
+
+FINE = MS // 100
+"""ns: who counts times in less of them may be as exact as any."""
 
 TIMELESS = 50 * MS
 """What may lie between two octets of one frame where there are no times: LINE_END, and what a faster line leaves of so
@@ -95,8 +98,10 @@ class ByteLog:
         self.session: Session = session
         first = self._first()
         adapter = session.adapter
-        if self._heading is not None and self._heading[1].exact:
-            adapter = Adapter("logic analyser", latency_from="exact times")
+        if self._heading is not None:
+            table = self._heading[1]
+            exact = Adapter("logic analyser", latency_from="exact times")
+            adapter = _as_coarse(exact if table.exact else adapter, table.tick)
         elif self._plan is not None:
             adapter = self._adapter(lines, adapter)
         self.session = replace(session, started=first.time if first is not None else 0, adapter=adapter)
@@ -159,10 +164,7 @@ class ByteLog:
         if not stamps:
             longest = LINE_END + max((len(line.octets) for line in read), default=0) * SLOW.char
             return replace(adapter, latency=max(TIMELESS, longest), latency_from=NO_TIMES)
-        tick = min(stamp.tick for stamp in stamps)
-        if tick <= FOREIGN_LATENCY:
-            return adapter
-        return replace(adapter, latency=tick, latency_from=f"the log's clock, which counts {tick // MS} ms")
+        return _as_coarse(adapter, min(stamp.tick for stamp in stamps))
 
     def _lines(self, split: Callable[[Iterator[str]], Iterator[str]] = lines_in) -> Iterator[str]:
         with open_capture(self.path) as stream:
@@ -210,6 +212,13 @@ class ByteLog:
         if first < 0:  # counted from a trigger: no time is before 1970
             found = [replace(chunk, time=chunk.time - first) for chunk in found]
         yield from sorted(found, key=lambda chunk: chunk.time)  # two lines of a bus are listed one after the other
+
+
+def _as_coarse(adapter: Adapter, tick: int) -> Adapter:
+    """The adapter with no more certainty than a clock has that counts so many ns."""
+    if tick <= max(adapter.latency, FINE):
+        return adapter
+    return replace(adapter, latency=tick, latency_from=f"the log's clock, which counts {tick / MS:g} ms")
 
 
 def _each(rows: Iterator[list[str]]) -> Iterator[list[str] | None]:

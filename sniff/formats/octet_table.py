@@ -23,7 +23,7 @@ from itertools import pairwise
 
 from dissectors.frame import Chunk, LineError, Mark
 from sniff.formats.log_times import AS_WRITTEN, UNIT_NAMES, Times, is_count, order_of, unit_of
-from sniff.formats.table_cells import DIGITS, MOST, UNITS, fits, octets_of, spelling_of, time_of
+from sniff.formats.table_cells import DIGITS, MOST, UNITS, fits, octets_of, spelling_of, tick_of, time_of
 
 OCTET = (
     "octet",
@@ -89,6 +89,9 @@ _DELIMITERS = (",", ";", "\t", "|")
 BETWEEN = 10_000_000
 """ns from a request to its answer, where a row has one time for both."""
 
+FEW_TIMES = 3
+"""Times of a column that tell how fine it counts; zeros at the end of one may have been left out."""
+
 LONGEST_HEADING = 4096
 """Characters."""
 
@@ -116,6 +119,8 @@ class TableLayout:
     """Where octets stand of the other direction, instead or too."""
     day: int | None = None
     """Where the day of the time stands."""
+    tick: int = 1
+    """ns: the place of the last digit that a time has."""
 
     @property
     def exact(self) -> bool:
@@ -244,8 +249,10 @@ def heading_of(heading: str, delimiter: str, rows: Sequence[str]) -> TableLayout
     told = [[one for one in cell[octet:] if one] if tail else [_either(cell, octet, other)] for cell in data]
     read = spelling_of([one for cell in told for one in cell])
     unit, times = _times_of([cell[when] for cell in data], [_length(cell, read) for cell in told], units[when])
+    ticks = [tick for cell in data if (tick := tick_of(cell[when], unit, times)) is not None]
     return TableLayout(
-        octet, read, delimiter, begin, end, place(DURATION), unit, kind, (*errors, *named), times, tail, other, day
+        octet, read, delimiter, begin, end, place(DURATION), unit, kind, (*errors, *named), times, tail, other, day,
+        min(ticks) if len(ticks) >= FEW_TIMES else 1,
     )  # fmt: skip
 
 

@@ -73,7 +73,7 @@ def test_everything_given_is_in_the_file(tmp_path: Path) -> None:
     found = capture(recorder.path)
     assert list(found.items()) == items
     assert found.completeness().whole
-    assert found.session == SESSION
+    assert replace(found.session, adapter=found.session.said or found.session.adapter, said=None) == SESSION
     assert recorder.chunks == 1000
     assert recorder.octets == 8000
     assert recorder.lost_octets == 0
