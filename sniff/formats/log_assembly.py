@@ -7,7 +7,9 @@ from dataclasses import replace
 
 from dissectors.checksums import ends_with_crc16
 from dissectors.frame import Chunk
-from dissectors.line import MS, LineSettings
+from dissectors.line import MS, NS_PER_S, LineSettings
+from dissectors.words import duration
+from sniff.engine.session import Item, LineEvent, LineEventKind
 from sniff.formats.dump_rows import FILLED_UP
 from sniff.formats.log_clock import DAY, Stamp
 from sniff.formats.log_lines import Kind, Line, head_of
@@ -22,6 +24,11 @@ COARSE = 2 * MS
 
 LONGEST = 4096
 """Octets put together from several lines; what goes on after them is the next read, without a silence."""
+
+SET_BACK = 10 * NS_PER_S
+"""A line that came so long before the one above it was written by a clock that was set back meanwhile, as it is when
+summer ends; lines of several writers are nearer in order.
+"""
 
 _BACKWARDS = 2_000_000_000
 _MOST_REPEATED = 1 << 16
@@ -41,6 +48,7 @@ class Assembly:
         self._last = 0
         self._any = False
         self._shift = 0
+        self._shift_before: int | None = None  # before the clock was set back last
         self._day = 0
         self._date = 0  # of the line that told one last
         self._clock = -1
@@ -63,7 +71,7 @@ class Assembly:
         self.completed = 0
         self.unwrapped = 0
 
-    def take(self, line: Line, text: str) -> Iterator[Chunk]:
+    def take(self, line: Line, text: str) -> Iterator[Item]:
         """Take a line; `text` as it is written."""
         self.was = line.kind if line.kind is not Kind.STRANGE or self._could_be(line, text) else Kind.TEXT
         if line.kind is Kind.ROW:
@@ -100,13 +108,13 @@ class Assembly:
             line = replace(line, stamp=before.stamp)
         self._heading, self._used = line, False
 
-    def close(self) -> Iterator[Chunk]:
+    def close(self) -> Iterator[Item]:
         """What is held at the end."""
         yield from self._flush()
 
     # -- lines ---------------------------------------------------------------------------------------------------
 
-    def _take_octets(self, line: Line) -> Iterator[Chunk]:
+    def _take_octets(self, line: Line) -> Iterator[Item]:
         role = self._plan.role(line, self._recent)
         is_annotation = line.samples is not None and line.samples[1] > line.samples[0]
         if is_annotation and (line.samples, line.octets) == self._annotated:
@@ -176,7 +184,7 @@ class Assembly:
 
     # -- rows of a hexdump -----------------------------------------------------------------------------------------
 
-    def _take_row(self, line: Line) -> Iterator[Chunk]:
+    def _take_row(self, line: Line) -> Iterator[Item]:
         try:
             offset = int(line.offset, self._plan.offsets or 16)
         except ValueError:
@@ -213,7 +221,7 @@ class Assembly:
         first = self._stamp
         return bool(self._held) and stamp is not None and first is not None and abs(stamp.time - first.time) < COARSE
 
-    def _between_rows(self, line: Line, text: str) -> Iterator[Chunk]:
+    def _between_rows(self, line: Line, text: str) -> Iterator[Item]:
         if text.strip() == "*":
             self._squeezed = True
             self.was = Kind.SHAPE
@@ -234,7 +242,7 @@ class Assembly:
 
     # -- times -----------------------------------------------------------------------------------------------------
 
-    def _flush(self) -> Iterator[Chunk]:
+    def _flush(self) -> Iterator[Item]:
         if not self._held:
             return
         octets = bytes(self._held)
@@ -257,8 +265,19 @@ class Assembly:
             ended = (self._samples[1] + self._plan.bit_samples) / self._plan.bit_samples * self._bit
             time = max(self._last, int(ended)) if ended < MOST else follows
         elif self._stamp is not None:
-            told = self._told(self._stamp) + self._shift
+            stamped = self._told(self._stamp)
+            told = stamped + self._shift
             told = told if told < MOST else follows  # steps that add up to no time
+            if self._shift_before is not None and self._last - SET_BACK <= stamped + self._shift_before < told:
+                told, self._shift = stamped + self._shift_before, self._shift_before  # a single line was wrong
+                self._shift_before = None
+            if self._any and told < self._last - SET_BACK:
+                back = self._last - told
+                self._shift_before, self._shift = self._shift, self._shift + follows - told
+                told = follows
+                yield LineEvent(
+                    self._last, LineEventKind.CLOCK, f"the log's clock goes back by {duration(back)}", -back
+                )
             is_coarse = self._stamp.tick >= COARSE or (told == self._last and self._any)
             time = told
             if is_coarse and self._any and told > self._last - _BACKWARDS:
