@@ -120,7 +120,7 @@ class Session:
         said = self.said or self.adapter
         if self.reads is not None and said.latency_from in UNNAMED and self._is_coarse:
             return replace(self, adapter=replace(said, latency=self.reads.unit, latency_from=COARSE), said=said)
-        if self.reads is None or "line" in self.unknown or self.line_is_assumed:
+        if self.reads is None or not self.has_times or "line" in self.unknown or self.line_is_assumed:
             return self
         told = held_back(self.reads, self.line, said.latency)
         is_named = said.latency or said.latency_from not in UNNAMED

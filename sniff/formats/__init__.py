@@ -15,12 +15,13 @@ from typing import TYPE_CHECKING, Any
 from dissectors.frame import Chunk
 from sniff.engine.capture import Capture, CaptureError, CaptureWriter
 from sniff.engine.read_times import LOOKED_AT, ReadTimes
-from sniff.engine.session import Item, LineEventKind, Session
+from sniff.engine.session import NO_TIMES_OF_PACKETS, UNNAMED, Item, LineEventKind, Session
 from sniff.formats import compressed, table
 from sniff.formats.cut_capture import cut_short
 from sniff.formats.files import explain, open_capture
 from sniff.formats.mark_file import with_marks
 from sniff.formats.several_buses import SeveralBuses, buses_in
+from sniff.formats.timeless import IN_PACKETS
 
 if TYPE_CHECKING:
     from sniff.formats.records import FrameFile
@@ -153,7 +154,12 @@ def with_first_reads(session: Session, items: Iterable[Item]) -> Session:
                 break
     except CaptureError:
         pass  # whoever reads on is told
-    return replace(session, reads=ReadTimes.of(reads), sample=tuple(sample)).with_latency_of_reads()
+    told = replace(session, reads=ReadTimes.of(reads), sample=tuple(sample))
+    adapter = session.adapter
+    is_foreign = adapter.latency > 0 and adapter.latency_from in UNNAMED
+    if is_foreign and told.reads is not None and told.reads.are_none:
+        return replace(told, adapter=replace(adapter, latency=IN_PACKETS, latency_from=NO_TIMES_OF_PACKETS))
+    return told.with_latency_of_reads()
 
 
 def keeps_frames(path: str | Path) -> bool:

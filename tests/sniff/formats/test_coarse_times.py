@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from dissectors.line import MS, NS_PER_S
+from dissectors.line import MS, NS_PER_S, LineSettings
 from dissectors.modbus.envelope import seal_rtu
+from dissectors.tracker import Verdict
+from sniff.bus.offline import settled
 from sniff.engine.session import with_settings
 from sniff.formats import read
 from tests.sniff.formats.packets_made import as_pcap
@@ -59,3 +61,16 @@ def test_packets_whose_times_are_whole_seconds(tmp_path: Path) -> None:
     assert with_settings(session, "modbus-rtu", session.line).adapter.latency == NS_PER_S
     packets = [(time + number * 15 * MS, octets) for number, (time, octets) in enumerate(packets)]
     assert read(as_pcap(tmp_path / "y.pcap", packets, 147)).session.adapter.latency == 20 * MS
+
+
+@pytest.mark.parametrize("step", [0, 1000])
+def test_packets_that_somebody_only_put_in_order(step: int, tmp_path: Path) -> None:
+    """As text2pcap does where a dump has no times."""
+    begin = 1_772_359_200 * NS_PER_S
+    packets = [(begin + number * step, ANSWERED if number % 2 else ASKED) for number in range(40)]
+    capture = read(as_pcap(tmp_path / "x.pcap", packets, 147))
+    assert not capture.session.has_times
+    session = with_settings(capture.session, "modbus-rtu", LineSettings.parse("9600,8N1"))
+    assert not session.has_times
+    verdicts = [one.transaction.verdict for one in settled(capture.items(), session) if one.transaction is not None]
+    assert verdicts == [Verdict.ANSWERED] * 40
