@@ -132,7 +132,8 @@ def test_what_rules_count_is_the_same_in_parts_that_begin_and_end_quietly(path: 
     cuts = sorted(data.draw(st.lists(st.sampled_from(places), min_size=1, max_size=2)))
     parts = [judged(session, items[begin:end]) for begin, end in pairwise((0, *cuts, len(items)))]
     merged, whole = all_of(reduce(Judgement.merge, parts)), all_of_whole(path)
-    for code in COUNTED:
+    answers_for_others = any(code == "MS306" for code, _ in whole)  # known by what was before, like those to all
+    for code in COUNTED - ({"MS301"} if answers_for_others else set()):
         assert _of_rule(code, merged) == _of_rule(code, whole), code
 
 
