@@ -49,6 +49,7 @@ WHOLE = (
     "anywhere",
     "shut out",
     "Max_Master",
+    "now and then answers",
 )
 """Words of cases that show only over time."""
 
