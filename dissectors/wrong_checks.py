@@ -34,7 +34,9 @@ NOT_MADE: Final = Mistake(
     "which is all zeros or all ones, whatever the frame says", "the sender's program does not compute the check"
 )
 SAME: Final = Mistake(
-    "in octets that are always the same", "no noise, which is never the same twice: the device makes its check wrongly"
+    "octet for octet the same each time",
+    "no noise, which is never the same twice: the device makes its check wrongly, or another one always speaks into it "
+    "at the same moment",
 )
 BY_ANOTHER_RULE: Final = "the sender's program makes the check by another rule than this protocol's"
 
@@ -69,6 +71,12 @@ class Habit:
     mistake: Mistake
     count: int
     tally: Tally
+
+    def told(self, check: str) -> str:
+        """What is wrong with them, in words. `check`: what the protocol calls it."""
+        if self.mistake == SAME:  # what they say may be spoilt, too
+            return f"damaged, {self.mistake.words}"
+        return f"right but for the {check}, {self.mistake.words}"
 
 
 @dataclass(slots=True)

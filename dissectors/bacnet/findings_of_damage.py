@@ -75,7 +75,7 @@ def _of_one(ring: Ring, mac: int, node: RingNode) -> Iterable[Remark]:
         ),
     ):
         if habit is not None:
-            yield _wrongly_checked(mac, habit, f"{habit.count} of its {sent} frames right but for the {what}")
+            yield _wrongly_checked(mac, habit, f"{habit.count} of its {sent} frames {habit.told(what)}")
     if node.cut_last >= DAMAGED_LEAST and node.cut_last >= AT_END_SHARE * node.damaged:
         seen = (
             f"{node.cut_last} of its {sent} frames lack their last octet or two, or it is wrong; all before that fits"
@@ -89,7 +89,7 @@ def _of_one(ring: Ring, mac: int, node: RingNode) -> Iterable[Remark]:
 
 
 def _wrongly_checked(mac: int, habit: Habit, seen: str) -> Remark:
-    finding = habit.tally.found(RULES["MS407"], subject(mac), f"{seen}, {habit.mistake.words}")
+    finding = habit.tally.found(RULES["MS407"], subject(mac), seen)
     return Remark(mac, replace(finding, means=habit.mistake.means or finding.means))
 
 

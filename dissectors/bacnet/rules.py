@@ -286,8 +286,8 @@ _ALL = (
         "Frames of one station that are right but for their data CRC, or for their header CRC: at least five, and 3 in "
         "4 of its damaged ones, with no line error, whose check differs from the right one in the same bits as others "
         "of their length that say something else, or is made by another rule each time (not complemented, its octets "
-        "turned, over other octets, another CRC, all zeros or ones), while hardly a frame of the kind is good. Noise "
-        "changes other bits each time.",
+        "turned, over other octets, another CRC, all zeros or ones), while hardly a frame of the kind is good; or so "
+        "many that are octet for octet the same. Noise changes other bits each time.",
         "the device computes its check otherwise: another start value or polynomial, or over other octets",
         "the device's firmware; whether something on the way changes octets",
         explains=("MS401", "MS402", "MS405", "MS102", "MS301", "LN2"),

@@ -7,7 +7,7 @@ from functools import reduce
 from operator import xor
 from typing import Final
 
-from dissectors.checksums import crc16_modbus, lrc
+from dissectors.checksums import crc16_modbus, crc16_x25, lrc
 from dissectors.frame import Damage, Frame
 from dissectors.modbus.envelope import RTU_NAME, ascii_octets, hex_pairs, rtu_check
 from dissectors.wrong_checks import ALIKE, BY_ANOTHER_RULE, NOT_MADE, Mistake, Way
@@ -30,6 +30,12 @@ _LRCS: Final[dict[Mistake, Callable[[bytes, bytes], int]]] = {
     ),
 }
 """What a sender may take for the LRC of a message: of its octets, or of the characters that they are sent as."""
+
+_CRCS: Final[dict[Mistake, Callable[[bytes], int]]] = {
+    Mistake("which is a CRC of another polynomial (CCITT)", BY_ANOTHER_RULE): crc16_x25,
+    Mistake("which is the sum of the octets, not a CRC", BY_ANOTHER_RULE): sum,
+}
+"""What a sender may take for the CRC of a message; either octet may come first."""
 
 _UPPER_BITS: Final = 0x8080  # of both octets of a CRC
 
@@ -54,6 +60,9 @@ def _rtu(frame: Frame) -> Iterator[tuple[Way, int]]:
     if not (received ^ right) & ~_UPPER_BITS and max(frame.octets) < 0x80:
         return  # received with 7 data bits
     begun_with_0 = int.from_bytes(crc16_modbus(bytes(octets - 2)).to_bytes(2, "little"), "big")
+    for mistake, made in _CRCS.items():
+        if made(frame.octets[:-2]) & 0xFFFF in (received, _turned(received)):
+            yield Way(mistake), right
     yield Way(ALIKE, received ^ right, octets, received ^ right == begun_with_0), right
     if received in (0, 0xFFFF):
         yield Way(NOT_MADE, received), right
@@ -85,4 +94,8 @@ def _ascii(frame: Frame) -> Iterator[tuple[Way, int]]:
 def _crcs(message: bytes) -> tuple[int, int]:
     """The CRC-16 of a message, as RTU sends it and the other way round, both read the low octet first."""
     crc = crc16_modbus(message)
-    return crc, crc >> 8 | (crc & 0xFF) << 8
+    return crc, _turned(crc)
+
+
+def _turned(check: int) -> int:
+    return check >> 8 | (check & 0xFF) << 8

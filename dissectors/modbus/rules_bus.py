@@ -196,7 +196,8 @@ def _of_requests(seen: BusRecord) -> Iterator[Finding]:
             yield tally.found(RULES[FLAWS[flaw]], "master", words, severity)
     habit = seen.miscounted_requests
     if habit is not None:
-        severity = Severity.ERROR if habit.count == seen.requests else Severity.WARNING
+        is_in_vain = not any(station.asked for station in seen.stations.values())  # not one request is good
+        severity = Severity.ERROR if is_in_vain else Severity.WARNING
         yield wrongly_checked("master", habit, counted(seen.requests, "request"), severity)
 
 
@@ -322,8 +323,9 @@ def _of_ends(seen: BusRecord) -> Iterator[Finding]:
                 continue  # not one frame is good, and a terminal may have taken CR away: see LN003
         for sender, tally in habits.items():
             words = f"{tally.count} of {counted(seen.frames[sender], 'frame')} end with {end.value}"
-            is_nothing_good = sender == "master" and end.is_damage and tally.count == seen.requests
-            yield _of_end(end, tally.found(RULES["MB019"], sender, words, Severity.ERROR if is_nothing_good else None))
+            is_all = sender == "master" and 10 * tally.count >= 9 * seen.requests
+            is_in_vain = is_all and (end.is_damage or not seen.answers)  # who should have answered is not to blame
+            yield _of_end(end, tally.found(RULES["MB019"], sender, words, Severity.ERROR if is_in_vain else None))
 
 
 def _of_end(end: OddEnd, finding: Finding) -> Finding:

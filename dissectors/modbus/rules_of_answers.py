@@ -214,11 +214,11 @@ ANSWER_RULES = (
         "ASCII frames that are whole and end with CR alone, LF alone, LF CR or CR CR LF (Modbus over Serial Line V1.02"
         ", 2.5.2): at least three, and 1 in 10 of the sender's. Those with CR in its place are read as good; who waits "
         "for CR finds no end in the others, which are damaged here, too. A note where everybody on the bus ends so; an "
-        "error where no request is good.",
+        "error where the requests do and nobody answers.",
         "a driver that is released before the last octet is out, or a device that ends its frames with CR alone; "
         "others may wait for the LF and drop the frame",
         "its turnaround or transmit-delay setting, a converter's timer for the direction; its end character",
-        explains=("MB001", "MB104", "MB009", "MB022", "LN003", "LN202", "LN203", "LN204", *_OF_DAMAGE),
+        explains=("MB001", "MB104", "MB105", "MB009", "MB022", "LN003", "LN202", "LN203", "LN204", *_OF_DAMAGE),
     ),
     Rule(
         "MB020",

@@ -222,8 +222,7 @@ def _miscounted(name: str, station: StationRecord) -> Finding | None:
 
 def wrongly_checked(name: str, habit: Habit, of: str, severity: Severity | None = None) -> Finding:
     """What a sender does with its checks. `of`: how many frames of its kind there were, in words."""
-    words = f"{habit.count} of {of} right but for the check, {habit.mistake.words}"
-    finding = habit.tally.found(RULES["MB021"], name, words, severity)
+    finding = habit.tally.found(RULES["MB021"], name, f"{habit.count} of {of} {habit.told('check')}", severity)
     return replace(finding, count=habit.count, means=habit.mistake.means or finding.means)
 
 

@@ -271,7 +271,7 @@ class ProfibusFindings:
             habit = one.checks.habit(damaged, one.answers - damaged) or one.checks.same(damaged)
             flaw, tally = max(one.flaws.items(), key=lambda item: item[1].count, default=(None, Tally()))
             if habit is not None:
-                seen = f"{habit.count} of {answers} right but for the sum, {habit.mistake.words}"
+                seen = f"{habit.count} of {answers} {habit.told('sum')}"
                 finding = habit.tally.found(RULES["PB020"], station(address), seen)
                 yield replace(finding, means=habit.mistake.means or finding.means)
             elif flaw is not None and tally.count >= _ALIKE_LEAST and 4 * tally.count >= 3 * damaged:

@@ -65,6 +65,16 @@ def _ending(end: bytes, frame: bytes) -> bytes:
     return frame[:-2] + end
 
 
+def _of_ccitt(frame: bytes) -> bytes:
+    """An RTU frame with the CRC that MS/TP has for data."""
+    return frame[:-2] + crc16_x25(frame[:-2]).to_bytes(2, "little")
+
+
+def _summed(frame: bytes) -> bytes:
+    """An RTU frame with a sum in place of its CRC."""
+    return frame[:-2] + (sum(frame[:-2]) & 0xFFFF).to_bytes(2, "big")
+
+
 def _begun_with_0(frame: bytes) -> bytes:
     """An RTU frame whose CRC began with 0."""
     return other_check(b"", frame)
@@ -124,6 +134,19 @@ CHECK_CASES: tuple[Case, ...] = (
             seeds=1,
         )
         for name, made, words in _LRCS
+    ),
+    Case(
+        "RTU check of one station is a CRC of CCITT",
+        _slave(_of_ccitt, False),  # type: ignore[arg-type]
+        (Said(_SECOND, ("MB021",)), Said(_SECOND, words="CCITT", own_words=True)),
+        seeds=1,
+    ),
+    Case("RTU check of the master is a sum", _master(_summed, False), (("MB021", "master"),), seeds=1),
+    Case(
+        "ASCII frames of the master end with CR CR LF, and nobody answers",
+        _master(partial(_ending, b"\r\r\n")),
+        (("MB019", "master"),),
+        seeds=1,
     ),
     Case("RTU check of the master computed otherwise", _master(_begun_with_0, False), (("MB021", "master"),), seeds=1),
     *(

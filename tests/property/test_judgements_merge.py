@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from dissectors.findings import Finding, Rule, Severity, found
 from dissectors.frame import Role
+from dissectors.tracker import Verdict
 from sniff.analysis.judgement import Heard, Judgement
 from sniff.analysis.judging import Judging, rules_over
 from sniff.bus.offline import outputs
@@ -59,7 +60,9 @@ def judged(session: Session, items: Items) -> Judgement:
 
 def quiet_places(items: Items) -> list[int]:
     """Where no exchange is under way, behind the first few, and not directly behind what is said to all: that somebody
-    answers it is known by what was before. Nor behind a master's answer to a poll: it joins with the token after it."""
+    answers it is known by what was before. Nor behind a master's answer to a poll: it joins with the token after it.
+    Nor beside an answer that nobody asked for: of the first row its request may be missing, and what another answered
+    in somebody's place is known by the request before."""
     first: dict[int, int] = {}
     last: dict[int, int] = {}
     to_all: set[int] = set()
@@ -71,6 +74,8 @@ def quiet_places(items: Items) -> list[int]:
             to_all.add(at + 1)
         if any(row.header is not None and row.header.kind == "reply-to-poll-for-master" for row in item.rows):
             to_all.add(at + 1)
+        if any(one.verdict is Verdict.UNSOLICITED for one in item.transactions):
+            to_all |= {at, at + 1}
         closed = [number for one in item.transactions for number in (one.id, one.of) if number is not None]
         for number in (*placed, *closed):
             first.setdefault(number, at)
@@ -132,11 +137,7 @@ def test_what_rules_count_is_the_same_in_parts_that_begin_and_end_quietly(path: 
     cuts = sorted(data.draw(st.lists(st.sampled_from(places), min_size=1, max_size=2)))
     parts = [judged(session, items[begin:end]) for begin, end in pairwise((0, *cuts, len(items)))]
     merged, whole = all_of(reduce(Judgement.merge, parts)), all_of_whole(path)
-    # who answers for others is known by what was before, like answers to what is said to all
-    left_out = {"MS301"} if any(code == "MS306" for code, _ in whole) else set()
-    if session.timing.latency:
-        left_out.add("MB009")  # what a late read tore is told by the rows before it
-    for code in COUNTED - left_out:
+    for code in COUNTED:
         assert _of_rule(code, merged) == _of_rule(code, whole), code
 
 
