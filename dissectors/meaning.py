@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from dissectors.frame import Frame
 from dissectors.profiles.brief_words import say_briefly
-from dissectors.profiles.decoding import Value, brief_title, decode, in_range, number, said_title, say
+from dissectors.profiles.decoding import Value, brief_title, decode, in_range, number, range_words, said_title, say
 from dissectors.profiles.model import Entry, Profile
 from dissectors.profiles.properties import due_property
 from dissectors.readings import PlaceName, Reading
@@ -212,8 +212,7 @@ def _beyond(value: Value) -> str:
     entry = value.entry
     if entry is None or in_range(entry, value.value):
         return ""
-    low, high = ("" if end is None else f"{end:g}" for end in (entry.low, entry.high))
-    return f" (out of the range {low} … {high} {entry.unit}".rstrip() + ")"
+    return f" (out of the range {range_words(entry)})"
 
 
 def _parts(entry: Entry, values: Sequence[Value]) -> tuple[tuple[str, str], ...]:

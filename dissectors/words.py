@@ -31,5 +31,10 @@ def duration(value: int) -> str:
     return f"{_three_digits(seconds)} s" if value < _MINUTES_FROM else f"{_three_digits(seconds / 60)} min"
 
 
+def exact_duration(value: float, unit: int) -> str:
+    """A duration in ns as a bare number of units of so many ns, with all its digits: "8.2"."""
+    return f"{value / unit:.9f}".rstrip("0").rstrip(".")
+
+
 def _three_digits(number: float) -> str:
     return f"{number:.0f}" if number >= 99.95 else f"{number:.1f}" if number >= 9.995 else f"{number:.2f}"

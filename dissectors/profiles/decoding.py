@@ -174,11 +174,11 @@ def number(value: int | float | str, entry: Entry | None = None, unit: str = "")
     scaled = entry is not None and entry.scale != 1 and isinstance(value, float) and math.isfinite(value)
     if entry is not None and entry.hexadecimal and isinstance(value, int):
         return f"{value:04X}h"
-    digits = f"{value:.{min(entry.decimals, 4)}f}" if scaled and entry is not None else _digits(value)
-    return f"{digits} {unit}".rstrip()
+    text = f"{value:.{min(entry.decimals, 4)}f}" if scaled and entry is not None else digits(value)
+    return f"{text} {unit}".rstrip()
 
 
-def _digits(value: int | float) -> str:
+def digits(value: int | float) -> str:
     """A whole number with all its digits, another with as many as a float of 32 bits has."""
     if isinstance(value, int) or (value.is_integer() and abs(value) < _EXACT):
         return str(int(value))
@@ -311,6 +311,20 @@ def in_range(entry: Entry, value: int | float | str) -> bool:
     if isinstance(value, str):
         return True
     return not ((entry.low is not None and value < entry.low) or (entry.high is not None and value > entry.high))
+
+
+def bare_range(entry: Entry) -> str:
+    """The values that the profile allows, without their unit: "0 … 400"; empty where it says nothing of them."""
+    if entry.low is None and entry.high is None:
+        return ""
+    low, high = ("" if end is None else f"{end:.12g}" for end in (entry.low, entry.high))
+    return f"{low} … {high}".strip()
+
+
+def range_words(entry: Entry) -> str:
+    """The same with the unit: "0 … 400 Hz"."""
+    span = bare_range(entry)
+    return f"{span} {entry.unit}".rstrip() if span else ""
 
 
 def joined(said: Sequence[str]) -> str:

@@ -14,7 +14,7 @@ from dissectors.frame import Event, Frame, Header, Role
 from dissectors.line import NS_PER_S, Timing
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
-from dissectors.profiles.decoding import Value, bit_words, decode, in_range, number, state_words
+from dissectors.profiles.decoding import Value, bit_words, decode, in_range, number, range_words, state_words
 from dissectors.profiles.model import Access, Entry, EntryRole, Profile
 from dissectors.profiles.properties import due_property
 from dissectors.readings import Origin, Reading
@@ -281,11 +281,9 @@ class ProfileFindings:
         entry = value.entry
         if entry is None or value.bit or entry.doubt or not value.reading.sure or in_range(entry, value.value):
             return
-        low = "" if entry.low is None else f"{entry.low:g}"
-        high = "" if entry.high is None else f"{entry.high:g}"
         what = "written" if value.how is Origin.WRITE else "answered"
-        seen = f"{entry.title} {number(value.value, entry, value.unit)} {what}, range {low} … {high} {entry.unit}"
-        self._add("PR001", who, f"{entry.name} {what}", seen.rstrip(), time, no)
+        seen = f"{entry.title} {number(value.value, entry, value.unit)} {what}, range {range_words(entry)}"
+        self._add("PR001", who, f"{entry.name} {what}", seen, time, no)
 
     def _judge_time(self, transaction: Transaction) -> None:
         profile = self._devices.at(transaction.station)

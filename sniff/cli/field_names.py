@@ -10,6 +10,7 @@ from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.tracker import Transaction
+from dissectors.words import exact_duration
 from sniff.bus.row_words import JSON_KEYS, iso
 from sniff.cli import USAGE, Failure
 from sniff.cli.tables import safe_cell
@@ -89,7 +90,7 @@ def _cell(value: object, type: FieldType) -> str:
     if type.kind is Kind.TIME and isinstance(value, int):
         return iso(value)
     if type.kind is Kind.DURATION and isinstance(value, int | float):
-        return f"{value / (MS if type.unit == 'ms' else NS_PER_S):.9f}".rstrip("0").rstrip(".")
+        return exact_duration(value, MS if type.unit == "ms" else NS_PER_S)
     return str(safe_cell(value)) if isinstance(value, str) else str(value)
 
 

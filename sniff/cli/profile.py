@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from dissectors.line import MS
 from dissectors.profiles import ProfileError
-from dissectors.profiles.decoding import number, plain_name, state_words
+from dissectors.profiles.decoding import bare_range, number, plain_name, state_words
 from dissectors.profiles.model import Entry, Profile
 from dissectors.profiles.parsing import is_name
 from sniff.analysis.sanitizing import sanitized
@@ -154,15 +154,12 @@ def _told(kinds: frozenset[str]) -> str:
 
 
 def _row(entry: Entry) -> tuple[str, ...]:
-    low = "" if entry.low is None else f"{entry.low:g}"
-    high = "" if entry.high is None else f"{entry.high:g}"
-    span = f"{low} … {high}" if low or high else ""
     remarks = [f"in the device: {entry.label}"] if entry.label else []
     remarks += [f"usually {_usual(entry, entry.default)}"] if entry.default is not None else []
     remarks += [f"doubtful: {entry.doubt}"] if entry.doubt else []
     title = f"{entry.title} ({'; '.join(remarks)})" if remarks else entry.title
     unit = entry.unit if entry.scale == 1 else f"{entry.scale:.12g} {entry.unit}".rstrip()
-    return _place(entry), entry.name, unit, span, entry.access.value, title
+    return _place(entry), entry.name, unit, bare_range(entry), entry.access.value, title
 
 
 def _usual(entry: Entry, default: float) -> str:

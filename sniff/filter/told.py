@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from dissectors.field_types import FieldType, Kind, plain_word
 from dissectors.profiles import Devices
 from dissectors.profiles.decoding import Value as Decoded
+from dissectors.profiles.decoding import digits
 from dissectors.profiles.model import Kind as EntryKind
 from dissectors.tracker import Transaction
 from sniff.engine.engine import Row
@@ -202,7 +203,7 @@ def _meant(name: str) -> Accepts:
 
 
 def _text(one: ToldPoint) -> str:
-    return one.value if isinstance(one.value, str) else one.words or f"{one.value:g}"
+    return one.value if isinstance(one.value, str) else one.words or digits(one.value)
 
 
 def there(name: str) -> ToldTest:

@@ -7,7 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 from dissectors.field_types import FieldType, Kind
-from dissectors.line import NS_PER_S
+from dissectors.line import MS, NS_PER_S
+from dissectors.words import exact_duration
+from sniff.analysis.json_text import iso
 from sniff.filter.agreeing import article, check_alike, check_range, spelled
 from sniff.filter.errors import FilterError
 from sniff.filter.expressions import NUMERIC, Expression, constant, counted, each, extreme, reckoned, sliced
@@ -95,7 +97,7 @@ class Values:
             self._numeric(of, call)
             return each(of, words, FieldType(kind, unit=of.type.unit), abs)
         if call.name == "string":
-            return each(of, words, FieldType(Kind.TEXT, digits=True), lambda found: _as_text(found, kind))
+            return each(of, words, FieldType(Kind.TEXT, digits=True), lambda found: _as_text(found, of.type))
         if kind not in (Kind.TEXT, Kind.OCTETS, Kind.ANY) or (kind is Kind.OCTETS and call.name != "len"):
             raise FilterError(f"{call.name}() takes a text; {of.words} is {article(of.type)}", call.column)
         if call.name == "len":
@@ -212,9 +214,9 @@ def _reach(operator: str, sides: Sequence[Expression], fixed: Sequence[Any]) -> 
     return None, None
 
 
-def _as_text(found: Any, kind: Kind) -> str:
+def _as_text(found: Any, type: FieldType) -> str:
     if isinstance(found, bytes):
         return found.hex()
-    if kind is Kind.DURATION:
-        return f"{found / NS_PER_S:g}"
-    return str(found)
+    if type.kind is Kind.DURATION:
+        return exact_duration(found, MS if type.unit == "ms" else NS_PER_S)
+    return iso(found) if type.kind is Kind.TIME else str(found)

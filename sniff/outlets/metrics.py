@@ -133,9 +133,9 @@ def _summary(latency: Histogram, labels: dict[str, object]) -> Iterator[str]:
     for share in (0.5, 0.95, 0.99):
         value = latency.quantile(share)
         assert value is not None
-        yield f"{name}{_labels({**labels, 'quantile': f'{share:g}'})} {value / NS_PER_S:g}"
+        yield f"{name}{_labels({**labels, 'quantile': f'{share:g}'})} {value / NS_PER_S!r}"
     yield f"{name}_count{_labels(labels)} {latency.count}"
-    yield f"{name}_sum{_labels(labels)} {latency.total / NS_PER_S:g}"
+    yield f"{name}_sum{_labels(labels)} {latency.total / NS_PER_S!r}"
 
 
 def _labels(labels: dict[str, object]) -> str:

@@ -13,7 +13,7 @@ from textual.widgets import DataTable, Static
 
 from dissectors.findings import counted
 from dissectors.line import NS_PER_S
-from dissectors.profiles.decoding import Quality, Value, number
+from dissectors.profiles.decoding import Quality, Value, number, range_words
 from sniff.analysis.guessed_points import GuessedPoint, LatestGuesses, guess_of
 from sniff.analysis.points import Point
 from sniff.analysis.sanitizing import sanitized
@@ -248,9 +248,8 @@ class PointsScreen(TableScreen):
         words += [entry.title] if entry is not None else []
         words.append(number(value.value, entry, value.unit) + (f" ({value.words})" if value.words else ""))
         words.append(f"raw {value.raw:#x}" if value.raw is not None else "")
-        if entry is not None and (entry.low is not None or entry.high is not None):
-            low, high = ("" if limit is None else f"{limit:g}" for limit in (entry.low, entry.high))
-            words.append(f"range {low} … {high}")
+        span = "" if entry is None else range_words(entry)
+        words.append(f"range {span}" if span else "")
         words += [{Quality.UNCERTAIN: "? uncertain", Quality.BAD: "! out of range"}.get(point.quality, "")]
         words += [f"? {entry.doubt}" if entry is not None and entry.doubt else ""]
         words.append("→ a command" if point.is_command else "")

@@ -10,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from dissectors.profiles import Devices
-from dissectors.profiles.decoding import Quality, decode, plain_name, say
+from dissectors.profiles.decoding import Quality, bare_range, decode, plain_name, range_words, say
 from dissectors.profiles.packaged import packaged, parse_text
 from dissectors.readings import Origin, Reading
 
@@ -226,3 +226,18 @@ def test_all_devices_have_a_profile_where_each_has_the_same() -> None:
     assert Devices({1: E510, 2: F510}).at(None) is None
     assert Devices({1: E510}, F510).at(None) is F510
     assert Devices({}, F510).at(None) is F510
+
+
+@pytest.mark.parametrize(
+    ("limits", "bare", "with_unit"),
+    [
+        ("range = [0, 4294967295]", "0 … 4294967295", "0 … 4294967295 Wh"),
+        ("range = [-2147483648, 1234567.5]", "-2147483648 … 1234567.5", "-2147483648 … 1234567.5 Wh"),
+        ("range = [0, 400]", "0 … 400", "0 … 400 Wh"),
+        ("", "", ""),
+    ],
+)
+def test_a_range_is_said_with_all_its_digits(limits: str, bare: str, with_unit: str) -> None:
+    profile = device(f'[[modbus.register]]\naddress = 0\nname = "a"\nunit = "Wh"\ntype = "s32"\n{limits}')
+    (entry,) = profile.entries  # type: ignore[attr-defined]
+    assert (bare_range(entry), range_words(entry)) == (bare, with_unit)

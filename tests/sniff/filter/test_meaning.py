@@ -101,6 +101,8 @@ NOISE = Row(8, Noise(b"\x00\x00", 2, 3, Place.BETWEEN, Reason.NO_FRAME))
         ("tx == 4 ^^ dst == 3", False),
         ("tx == 4 xor dst == 4", True),
         ('string(dst) matches "^3$"', True),
+        ('string(latency_ms) == "8.2"', True),  # as it is shown
+        ('string(frame.time) == "1970-01-01T00:00:00.000000000Z"', True),
         ("max(dst, no) == 7 && min(dst, no) == 3", True),
         ("max(dst, 9) == 9 && min(9, dst) == 3", True),
         ("frame.time == 1970-01-01", True),

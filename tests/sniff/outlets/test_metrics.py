@@ -61,6 +61,13 @@ def test_every_line_is_as_the_specification_has_it() -> None:
     assert 'quantile="0.95"' in page
 
 
+def test_a_sum_of_days_still_grows_by_milliseconds() -> None:
+    one = told("rtu-usual-faults")
+    node = next(node for node in one.model.summary.nodes.present() if node.latency.count)
+    node.latency.total = 123_456_789_012_345
+    assert f'station="{node.address}"}} 123456.789012345\n' in exposition([one])
+
+
 PARSE = """
 import json, sys
 from prometheus_client.openmetrics.parser import text_string_to_metric_families as parse
