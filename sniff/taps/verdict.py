@@ -185,11 +185,10 @@ def _spared(others: Mapping[int, Traffic], tap: int, share: float) -> tuple[int,
 
 def _is_rare(count: int, expected: float) -> bool:
     """Whether so few of so many expected would be chance (Poisson's sum up to `count`)."""
-    term = total = math.exp(-expected)
-    for at in range(1, count + 1):
-        term *= expected / at
-        total += term
-    return total < CHANCE
+    if not expected:
+        return False
+    each = math.log(expected)  # of thousands, not even the first term is a number
+    return sum(math.exp(at * each - expected - math.lgamma(at + 1)) for at in range(count + 1)) < CHANCE
 
 
 def _place(hit: Mapping[int, Traffic], spared: tuple[int, ...], tap: int, doubt: int) -> FaultPlace:

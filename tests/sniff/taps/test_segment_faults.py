@@ -194,3 +194,12 @@ def test_on_a_token_ring_whose_frames_are_all_alike(
     assert {(fault.place, fault.tap, fault.kind) for fault in found} == expected
     if name == "clean":
         assert sum(one.both for one in senders.values()) == 2400
+
+
+def test_of_a_million_frames_who_is_hit_hardly_less_is_not_spared() -> None:
+    hit, hardly_less = (Traffic(both=1_000_000 - count, damaged=[0, count]) for count in (4_100, 3_950))
+    (fault,) = faults({1: hit, 2: hardly_less}, 0)
+    assert (fault.place, fault.spared) == (FaultPlace.EITHER, ())
+    whole = Traffic(both=1_000_000)
+    (fault,) = faults({1: hit, 2: whole}, 0)
+    assert (fault.place, fault.spared) == (FaultPlace.BETWEEN, (2,))
