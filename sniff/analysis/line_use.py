@@ -58,8 +58,7 @@ class LineUse:
         self._last = max(self._last, event.end)
         busy = len(event.octets) * self._char
         self._busy += busy
-        second = event.end // NS_PER_S
-        self._load(second, min(busy, event.end - second * NS_PER_S), busy)
+        self._load_one(event.end, busy)
         if role is Role.BROADCAST and isinstance(event, Frame) and event.ok:
             self._broadcast.add(event.start, no)
             self._broadcast_busy += busy
@@ -72,18 +71,26 @@ class LineUse:
         busy = table.frames.length.astype(np.int64) * self._char
         self._last = max(self._last, int(ends.max()))
         self._busy += int(busy.sum())
-        if (ends[1:] < ends[:-1]).any():  # times that run backwards
+        seconds = ends // NS_PER_S
+        late = np.minimum(busy, ends - seconds * NS_PER_S)
+        if (ends[1:] < ends[:-1]).any() or (busy - late > NS_PER_S).any():  # times run backwards; rows of many seconds
             for end, of_row in zip(ends.tolist(), busy.tolist(), strict=True):
-                self._load(end // NS_PER_S, min(of_row, end % NS_PER_S), of_row)
+                self._load_one(end, of_row)
         else:
-            seconds = ends // NS_PER_S
-            late = np.minimum(busy, ends - seconds * NS_PER_S)
             begins = np.flatnonzero(np.append(True, seconds[1:] != seconds[:-1]))
             sums = (seconds[begins], np.add.reduceat(late, begins), np.add.reduceat(busy, begins))
             for second, of_second, of_both in zip(*(one.tolist() for one in sums), strict=True):
                 self._load(second, of_second, of_both)
         self._broadcast.add_many(starts[broadcast].tolist(), (table.first + broadcast[:EVIDENCE_MAX]).tolist())
         self._broadcast_busy += int(busy[broadcast].sum())
+
+    def _load_one(self, end: int, busy: int) -> None:
+        """Octets that took `busy` ns up to `end`, over the seconds that they took; at low rates several."""
+        self._load(end // NS_PER_S, min(busy, end % NS_PER_S), min(busy, end % NS_PER_S + NS_PER_S))
+        left, at = busy - end % NS_PER_S - NS_PER_S, 3
+        while left > 0 and at <= len(self._seconds):
+            self._seconds[-at] += min(left, NS_PER_S)
+            left, at = left - NS_PER_S, at + 1
 
     def _load(self, second: int, late: int, busy: int) -> None:
         """Octets that took `busy` ns, `late` of them in a second and the rest in the one before it."""
@@ -122,8 +129,9 @@ class LineUse:
         noted, full = self._most[SHORT], self._most[LONG]
         if noted >= BUSY or full >= FULL:
             span = LONG if full >= FULL else SHORT
-            average = self._busy / max(1, self._last - (self._first or 0))
-            seen = f"octets on the line in {self._most[span]:.0%} of {span} s at the busiest, {average:.0%} of all time"
+            average = min(1.0, self._busy / max(1, self._last - (self._first or 0)))
+            most = min(1.0, self._most[span])
+            seen = f"octets on the line in {most:.0%} of {span} s at the busiest, {average:.0%} of all time"
             yield found(
                 RULES["LN401"],
                 "bus",

@@ -65,11 +65,14 @@ class Load:
         second = self._second(number)
         octets = len(event.octets)
         busy = octets * self.line.char
-        late = min(busy, event.end - number * NS_PER_S)
         self.total.busy += busy
+        late = min(busy, event.end - number * NS_PER_S)
         second.busy += late
-        if late < busy:  # it began in the second before
-            self._second(number - 1).busy += busy - late
+        left, before = busy - late, number - 1
+        while left > 0:  # it began in a second before
+            of_it = min(left, NS_PER_S) if before * NS_PER_S > event.start else left
+            self._second(before).busy += of_it
+            left, before = left - of_it, before - 1
         for part in (self.total, second):
             part.octets += octets
             if isinstance(event, Frame):
@@ -91,13 +94,13 @@ class Load:
         self.last = int(ends.max()) if self.last is None else max(self.last, int(ends.max()))
         numbers = ends // NS_PER_S
         base = int(numbers.min()) - 1
-        if int(numbers.max()) - base > MOST_AT_ONCE:  # times that jump: second by second
+        early = octets.astype(np.int64) * self.line.char - (ends - numbers * NS_PER_S)  # of the second before
+        if int(numbers.max()) - base > MOST_AT_ONCE or int(early.max()) > NS_PER_S:  # times that jump, rows of seconds
             for output in table.outputs():
                 for row in output.rows:
                     self.add(row)
             return
         places, least = numbers - base, int(numbers.max()) - base + 1
-        early = octets.astype(np.int64) * self.line.char - (ends - numbers * NS_PER_S)  # of the second before
         begun = np.flatnonzero(early > 0)
         noise = np.flatnonzero(~is_frame)
 
