@@ -157,10 +157,13 @@ class Load:
 
     def share_of(self, part: Second, start: int, end: int) -> float:
         """Bus load, 0 … 1, of a stretch (ns) whose seconds together are `part`; only what the capture covers counts."""
+        return min(1.0, part.busy / max(self.heard_of(start, end), self.line.char))
+
+    def heard_of(self, start: int, end: int) -> int:
+        """How much of a stretch (ns) the capture covers, from the first octet to the last, ns."""
         if self.last is None or self.first is None:
-            return 0.0
-        span = min(end, self.last) - max(start, self.first)
-        return min(1.0, part.busy / max(span, self.line.char))
+            return 0
+        return max(0, min(end, self.last) - max(start, self.first))
 
     def overall(self) -> float:
         """Bus load, 0 … 1, over the whole capture."""

@@ -217,7 +217,7 @@ NODE_HEADINGS = (
 )
 HEALTH_HEADINGS = ("subject", "health", "why")
 LATENCY_HEADINGS = ("address", "answers", "least ms", "p50 ms", "p95 ms", "max ms", "± ms")
-LOAD_HEADINGS = ("from", "load %", "frames", "damaged", "noise octets", "octets")
+LOAD_HEADINGS = ("from", "heard s", "load %", "frames", "damaged", "noise octets", "octets")
 
 
 class _Kinds:
@@ -285,6 +285,7 @@ def _load(summary: Summary, every: int) -> list[tuple[Cell, ...]]:
     return [
         (
             iso(number * every),
+            round(summary.load.heard_of(number * every, (number + 1) * every) / NS_PER_S, 4),
             round(100 * summary.load.share_of(part, number * every, (number + 1) * every), 4),
             part.frames,
             part.damaged,

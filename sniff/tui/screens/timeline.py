@@ -11,6 +11,7 @@ from textual.widgets import Static
 
 from dissectors.findings import counted
 from dissectors.line import NS_PER_S
+from dissectors.words import duration
 from sniff.analysis.load import Second
 from sniff.bus.rows import Store
 from sniff.tui.analyzer import analyzer
@@ -45,11 +46,12 @@ LEAST_AXIS = 0.1
 
 class Column(NamedTuple):
     """Some seconds of the bus drawn as one character. `begin`: s since the epoch; `load`: of all its time, `share`: of
-    what the capture covers of that, which is less where it begins and ends."""
+    what the capture covers of that, `heard` (ns), which is less where it begins and ends."""
 
     begin: int
     load: float
     share: float
+    heard: int
     frames: int
     damaged: int
     noise: int
@@ -70,8 +72,9 @@ def columns(store: Store, begin: int, width: int, zoom: int) -> list[Column]:
         )
         failed = _failed(store, at, at + zoom) if parts else 0
         load = min(1.0, together.busy / (zoom * NS_PER_S))
-        share = store.load.share_of(together, at * NS_PER_S, (at + zoom) * NS_PER_S)
-        made.append(Column(at, load, share, together.frames, together.damaged, together.noise, failed))
+        stretch = at * NS_PER_S, (at + zoom) * NS_PER_S
+        share, heard = store.load.share_of(together, *stretch), store.load.heard_of(*stretch)
+        made.append(Column(at, load, share, heard, together.frames, together.damaged, together.noise, failed))
     return made
 
 
@@ -216,8 +219,10 @@ class TimelineScreen(ViewScreen):
     def _words(self, column: Column | None, zoom: int, chosen: tuple[int, int] | None) -> str:
         if column is None:
             return ""
+        is_part = column.heard < 0.99 * zoom * NS_PER_S
         words = (
-            f"{clock(column.begin * NS_PER_S)[:8]} + {seconds_in_words(zoom)}: load {column.share:.1%}, "
+            f"{clock(column.begin * NS_PER_S)[:8]} + {seconds_in_words(zoom)}: load {column.share:.1%}"
+            f"{f' of {duration(column.heard)} heard' if is_part else ''}, "
             f"{counted(column.frames, 'frame')}, {counted(column.failed, 'error')}, {column.damaged} damaged, "
             f"{counted(column.noise, 'octet')} of noise"
         )

@@ -40,3 +40,9 @@ def test_a_frame_over_the_boundary_counts_in_both_seconds(sniff485: Callable[...
     whole = sum(row["octets"] for row in seconds)
     assert whole == info["octets"] == 16
     assert seconds[0]["load %"] > 2.5  # of half a second: one frame, and most of another
+    assert [row["heard s"] for row in seconds] == [pytest.approx(0.509, abs=1e-3), pytest.approx(0.003, abs=1e-3)]
+
+
+def test_how_much_of_a_row_was_heard_stands_beside_its_load(sniff485: Callable[..., Any], tmp_path: Path) -> None:
+    _, *seconds = rows(sniff485, tmp_path, [900, *[100] * 12])
+    assert [row["heard s"] for row in seconds] == [pytest.approx(0.109, abs=1e-3), 1, pytest.approx(0.1, abs=1e-3)]

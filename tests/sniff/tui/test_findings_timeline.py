@@ -175,7 +175,8 @@ def test_the_load_of_a_second_that_is_not_over_is_of_what_was_heard_of_it(look, 
 
     async def script(see):
         await see.press("plus", "plus", "plus", "plus", "G")
-        assert f"+ 1 s: load {known:.1%}" in see.text()
+        assert f"+ 1 s: load {known:.1%} of " in see.text()
+        assert " heard, " in see.text()
 
     look(store, script, start="timeline")
 
