@@ -232,7 +232,8 @@ _ALL = (
         "disturbances at a steady interval",
         "At least six bursts of damage or noise with 8% between their intervals, a second or more apart, that strike "
         "several senders, or of which nobody is known and that are noise (with line errors, no two alike), with good "
-        "frames between: no single station's rhythm, and none at which anything is sent on this bus.",
+        "frames between: no single station's rhythm, and none at which anything is sent on this bus, nor at which it "
+        "begins to speak after a silence.",
         "something that switches at that interval: a contactor, a pump, a heater, a compressor, a thermostat",
         "what in the plant switches at that interval, and its cable beside the bus; a suppressor at its coil",
         explains=_DAMAGE,

@@ -1,22 +1,26 @@
-"""The bus's own rhythm: how often the same frame comes. Pure, bounded."""
+"""The bus's own rhythm: how often the same frame comes, and how often anybody speaks at all. Pure, bounded."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dissectors.line import MS
+from dissectors.histogram import Histogram
+from dissectors.line import MS, NS_PER_S
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-    from dissectors.columns import Octets, Times
+    from dissectors.columns import Masks, Octets, Times
     from sniff.engine.table import Table
 
 MOST_ROUNDS = 300
 STEADY = 0.5
 NEAR = 0.05
+QUIET = NS_PER_S // 2
+"""A bus that was silent for so long begins anew to speak; trouble that was away for so long, too."""
+BOUTS_LEAST = 4
 
 
 @dataclass(slots=True)
@@ -122,6 +126,45 @@ class Rounds:
                 if any(abs(interval - times * every) <= NEAR * interval for times in (1, 2, 3)):
                     return True
         return False
+
+
+class Bouts:
+    """When the bus begins to speak again after a silence that nobody waited in: trouble shows only where there are
+    octets. Fed every row."""
+
+    def __init__(self) -> None:
+        self._now = 0
+        self._begun: int | None = None
+        self._is_at_rest = False  # the newest row is good, and no request
+        self._every = Histogram()
+
+    def see(self, start: int, end: int, at_rest: bool) -> None:
+        """Take the next row; ns. `at_rest`: whether it is good and asks for nothing."""
+        if self._is_at_rest and start - self._now >= QUIET:
+            self._begin(start)
+        self._now, self._is_at_rest = max(self._now, end), at_rest
+
+    def take(self, starts: Times, ends: Times, at_rest: Masks) -> None:
+        """Take rows, one or more."""
+        import numpy as np
+
+        before = np.maximum(np.maximum.accumulate(np.append(self._now, ends[:-1])), self._now)
+        rested = np.append(self._is_at_rest, at_rest[:-1])
+        for start in starts[rested & (starts - before >= QUIET)].tolist():
+            self._begin(start)
+        self._now, self._is_at_rest = max(self._now, int(ends.max())), bool(at_rest[-1])
+
+    def is_own(self, interval: int) -> bool:
+        """Whether the bus begins to speak at that interval, ns."""
+        low, median, high = (self._every.quantile(part) for part in (0.25, 0.5, 0.75))
+        if self._every.count < BOUTS_LEAST or low is None or median is None or high is None:
+            return False
+        return high - low <= 2 * NEAR * median and abs(interval - median) <= NEAR * interval
+
+    def _begin(self, start: int) -> None:
+        if self._begun is not None:
+            self._every.add(max(0, start - self._begun))
+        self._begun = start
 
 
 def _marks(octets: Octets, begins: Times, lengths: Times) -> npt.NDArray[np.uint64]:

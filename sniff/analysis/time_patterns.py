@@ -1,7 +1,8 @@
 """Time patterns of trouble: in step with the mains, in bursts at a steady interval, all at once. Pure, bounded.
 
 Each pattern is told once, about the bus, and only where the bus's own rhythm does not explain it: a master that polls
-every 100 ms is in step with 50 Hz by itself, and what is asked every 5 s fails every 5 s.
+every 100 ms is in step with 50 Hz by itself, what is asked every 5 s fails every 5 s, and so does a bus that speaks
+every 5 s.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from dissectors.words import milliseconds
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.lost_together import LostTogether
 from sniff.analysis.other_settings import Fit, what_fits
-from sniff.analysis.rounds import Rounds
+from sniff.analysis.rounds import QUIET, Bouts, Rounds
 from sniff.analysis.sender_findings import MASTER
 from sniff.analysis.silences import Silences
 from sniff.analysis.slower_bus import slower_by
@@ -43,9 +44,6 @@ STRUCK_LEAST = 5
 
 HUM_SPAN = 2 * NS_PER_S  # over longer the mains drift
 SAME = 4 * MS  # what follows sooner is the same disturbance
-
-QUIET = NS_PER_S // 2
-"""Without trouble for so long, the next trouble begins another burst."""
 
 BURSTS_LEAST = 6
 BURSTS_KEPT = 500
@@ -129,6 +127,7 @@ class TimePatterns:
         # bursts
         self._bursts: list[_Burst] = []
         self._rounds = Rounds()
+        self._bouts = Bouts()
         # stretches that cannot be read
         self._stretch: _Stretch | None = None
         self._stretches: list[_Stretch] = []
@@ -140,7 +139,9 @@ class TimePatterns:
     def see(self, no: int, event: Event, sender: str) -> None:
         """Take the next row."""
         self._silences.see(event, sender == MASTER)
-        if isinstance(event, Frame) and event.ok and not is_struck(event):
+        is_good = isinstance(event, Frame) and event.ok
+        self._bouts.see(event.start, event.end, is_good and sender != MASTER)
+        if is_good and not is_struck(event):
             self._rounds.see(event.octets, event.start)
         self.see_trouble(no, event, sender)
 
@@ -176,6 +177,7 @@ class TimePatterns:
         address sent it.
         """
         self._silences.take(table.frames.start, table.frames.end, asks)
+        self._bouts.take(table.frames.start, table.frames.end, table.good & ~asks)
         self._rounds.take(table, sound)
 
     def see_good(self, ends: Times) -> None:
@@ -348,7 +350,7 @@ class TimePatterns:
         between = sorted(burst.good_before for burst in bursts[1:])[len(intervals) // 2]
         if usual < NS_PER_S or steady < 0.75 * len(intervals) or between < 10:
             return None
-        if self._rounds.is_own(usual):
+        if self._rounds.is_own(usual) or self._bouts.is_own(usual):
             return None
         if not struck and not self._is_noise(bursts):
             return None  # somebody who speaks at that interval

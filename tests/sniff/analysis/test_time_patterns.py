@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import random
 from functools import partial
 
+import numpy as np
 import pytest
 
 from dissectors.frame import Check, Damage, FoundBy, Frame
-from dissectors.line import LineSettings
-from dissectors.simulated_faults import BitFlips, MarkParity, NoiseInGaps
+from dissectors.line import LineSettings, Timing
+from dissectors.modbus.simulated import Cells, ModbusServer
+from dissectors.modbus.simulated_master import PollingMaster, read_holding
+from dissectors.simulated_faults import BitFlips, Fault, MarkParity, NoiseInGaps
+from sniff.analysis.rounds import Bouts
 from sniff.analysis.time_patterns import TimePatterns
 from sniff.engine.session import Session
+from sniff.simulation.scenarios import Scenario
 from sniff.simulation.tap import EXACT, FTDI
+from sniff.simulation.wire import Party
 from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case
 from tests.faults.line_faults import AtTimes, paused
@@ -24,6 +31,10 @@ MS = 1_000_000
 S = 1_000_000_000
 FIVE = partial(modbus, units=(1, 2, 3, 4, 5))
 FAST = partial(modbus, line=LineSettings.parse("38400,8E1"))
+
+
+def vars_of(bouts: Bouts) -> list[object]:
+    return [getattr(bouts, name) for name in ("_now", "_begun", "_is_at_rest", "_every")]
 
 
 def patterns(case: Case, seed: int = 1) -> set[str]:
@@ -58,6 +69,42 @@ def test_hum_is_not_told_from_times_that_do_not_allow_it() -> None:
     hum = next(case for case in LINE_RULE_CASES if "50 Hz" in case.name)
     assert patterns(Case("", hum.make, (), FTDI)) == set()
     assert patterns(hum) == {"LN301"}
+
+
+def in_groups(faults: tuple[Fault, ...], every: int, seed: int = 0) -> Scenario:
+    """Polls in a group now and then, each time for something else: no request comes at the interval of the groups."""
+    line = LineSettings.parse("19200,8E1")
+    units = (1, 2, 3, 4, 5)
+
+    def parties() -> list[Party]:
+        requests = [lambda now, unit=unit: read_holding(unit, now // every % 30, 6) for unit in units] * 2
+        master = PollingMaster(requests, line, interval=every, pause=25 * MS, timeout=700 * MS, retries=1)
+        servers = [ModbusServer(unit, holding=Cells(dict.fromkeys(range(40), 7)), delay=9 * MS) for unit in units]
+        return [Party("master", master, answers=False)] + [Party(f"unit {one.unit}", one) for one in servers]
+
+    return Scenario("", "modbus-rtu", line, parties, faults, seed, Timing(line).t35)
+
+
+def test_a_bus_that_speaks_at_an_interval_is_struck_at_that_interval() -> None:
+    assert patterns(Case("", partial(in_groups, (MarkParity(0.01),), 5 * S), ()), 2) == set()
+
+
+def test_something_that_switches_shows_on_a_bus_that_speaks_at_an_interval_of_its_own() -> None:
+    case = Case("", partial(in_groups, (AtTimes(7 * S, 400 * MS, 0.3),), S), (), seconds=80)
+    assert patterns(case) == {"LN302"}
+
+
+def test_when_a_bus_begins_to_speak_is_the_same_by_rows_and_by_columns() -> None:
+    dice = random.Random(3)
+    starts = np.cumsum([dice.choice((5 * MS, 20 * MS, 600 * MS, 2 * S)) for _ in range(400)])
+    ends, rests = starts + 4 * MS, np.array([dice.random() < 0.7 for _ in range(400)])
+    by_rows, by_columns = Bouts(), Bouts()
+    for start, end, at_rest in zip(starts.tolist(), ends.tolist(), rests.tolist(), strict=True):
+        by_rows.see(start, end, at_rest)
+    for begin in (0, 1, 150):
+        end = {0: 1, 1: 150, 150: 400}[begin]
+        by_columns.take(starts[begin:end], ends[begin:end], rests[begin:end])
+    assert vars_of(by_rows) == vars_of(by_columns)
 
 
 def test_other_periods_are_no_mains() -> None:
