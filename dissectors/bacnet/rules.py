@@ -235,8 +235,9 @@ _ALL = (
         Severity.WARNING,
         "damaged frames of one station",
         "Frames of one sender, known by its header or by whose turn it was: at least three and one in 100 of its "
-        "frames, "
-        "and three times as many as its share of the octets would bring if noise hit everybody alike.",
+        "frames, and three times as many as its share of the octets would bring if noise hit everybody alike. Octets "
+        "that two who use one token may have sent at once count for neither; tables and health count them where the "
+        "turn was.",
         "the sender's transceiver, its connection, or somebody who talks over it",
         "that station's connection, and its address",
         explains=("MS401", "MS403", "LN101", "LN103", "LN2"),

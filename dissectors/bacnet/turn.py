@@ -18,6 +18,7 @@ from dissectors.bacnet.limits import (
     T_NO_TOKEN,
     T_REPLY_DELAY,
     T_USAGE_DELAY,
+    T_USAGE_TIMEOUT,
     T_USAGE_TIMEOUT_MAX,
 )
 from dissectors.checksums import crc8_mstp
@@ -156,12 +157,13 @@ class Turn:
             made += self._of_holder(source, 0 if most >= soonest else _UNLIKELY)
         else:
             by = self.passed_by
-            late = _UNLIKELY if by is not None and least > _USE_MOST else 0
+            is_given_up = by is not None and least > T_USAGE_TIMEOUT  # a slow one may still use it
+            late = _UNLIKELY if by is not None and least > _USE_MOST else int(is_given_up)
             made += self._of_holder(holder, late)
             if by is not None:
                 again = 0 if most >= T_USAGE_DELAY else _UNLIKELY
                 made.append(_Guess(again, _TOKEN, holder, by))
-                made += self._of_holder(by, again + 1)
+                made += self._of_holder(by, again + (not is_given_up))
         read = frame.octets[4] if len(frame.octets) > 4 else None
         if read is not None and (read in self._heard or not made):
             made += self._of_holder(read, _STRANGE if made else 0)

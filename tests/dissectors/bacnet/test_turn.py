@@ -181,6 +181,15 @@ def test_what_is_left_of_a_token_is_of_who_had_it(octets: bytes, latency: float)
     assert all(isinstance(event, Frame) and event.ok for event in read.events[5:])
 
 
+@pytest.mark.parametrize(("after", "source"), [(34, 1), (5, 5)])
+def test_who_gave_up_its_neighbour_polls_on(after: float, source: int):
+    """A poll whose source is 0, one bit from 1 and two from 5: 5 was passed the token, and has it until 1 gives up."""
+    spoilt_poll = spoil(poll(1, 6), 4, 1)
+    read = script([*rounds(2, 1, 5, 9), (2, token(1, 5)), (34, token(1, 5)), (after, spoilt_poll)])
+    assert read.placements[-1] is not None
+    assert read.placements[-1].source == source
+
+
 @pytest.mark.parametrize(
     "octets",
     [
