@@ -4,7 +4,7 @@ Points are taken off 100, never below 0:
 
     of a station                                              points                     at most
       requests without answer                                 200 × share of requests      100
-      damaged frames from or to it, or damaged answers        300 × share                   60
+      frames from it damaged, or answers                      300 × share                   60
       late answers, second answers, answers after a repeat    100 × share of requests       30
       exceptions                                               50 × share of requests       20
       findings about it                                       30 an error, 10 a warning     60
@@ -120,7 +120,7 @@ def station_health(node: Node, findings: Iterable[Finding] = (), beyond: _Beyond
         return None
     asked, verdicts = node.asked, node.verdicts
     answers = beyond.answers * _share(verdicts[Verdict.DAMAGED_ANSWER], asked)
-    of_frames = beyond.frames * _share(node.damaged, node.weighed)
+    of_frames = beyond.frames * _share(node.damaged, node.sent)
     again = verdicts[Verdict.LATE] + verdicts[Verdict.ANSWERED_TWICE] + verdicts[Verdict.RETRY]
     return _sum(
         findings,

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class Node:
-    """One station. Times are ns; `damaged` counts frames from it that were not good, and those to it of unknown sender.
+    """One station. Times are ns; `damaged` counts frames from it that were not good; those to it are somebody else's,
+    also of a master without an address.
 
     `verdicts`: of requests and data to it. Tokens and polls for masters are `passed` to it instead; a token that it did
     not use is `unused`, and no request without answer. `errors`: what was wrong with answers; not with the requests,
@@ -30,7 +31,6 @@ class Node:
     address: int
     sent: int = 0  # frames from it
     received: int = 0  # frames to it
-    anonymous: int = 0  # of those, the ones of unknown sender: of a master where frames do not name it
     damaged: int = 0
     heard: int = 0  # good frames from it, or put right: a damaged frame may name a station that there is not
     first: int | None = None
@@ -57,11 +57,6 @@ class Node:
         return sum(self.verdicts[verdict] for verdict in EXPECTING) - late
 
     @property
-    def weighed(self) -> int:
-        """Frames among which `damaged` counts: its own, and those to it that nobody else's name is on."""
-        return self.sent + self.anonymous
-
-    @property
     def answered(self) -> int:
         """Those of them that got what they asked for, in time."""
         return sum(self.verdicts[verdict] for verdict in ANSWERS)
@@ -79,7 +74,6 @@ class Node:
             self.address,
             self.sent + other.sent,
             self.received + other.received,
-            self.anonymous + other.anonymous,
             self.damaged + other.damaged,
             self.heard + other.heard,
             min(times, default=None),
@@ -138,8 +132,7 @@ class NodeTable:
             node = self._node(address)
             node.sent += sends
             node.received += not sends
-            node.anonymous += not sends and source is None
-            node.damaged += not row.event.ok and (sends or source is None)
+            node.damaged += sends and not row.event.ok
             node.heard += sends and (row.event.ok or row.event.repair is not None)
             node.first = row.event.start if node.first is None else node.first
             node.last = row.event.end
@@ -174,20 +167,17 @@ class NodeTable:
         source = np.where(has_place, table.placed.source, frames.source)
         destination = np.where(has_place, table.placed.destination, frames.destination)
         good = table.good
-        whole, anonymous = good | table.repaired, source == NONE
+        whole = good | table.repaired
         seen: dict[int, list[int]] = {}
         for addresses, sends in ((source, True), (destination, False)):
             rows = np.flatnonzero(known & (addresses != NONE))
             held = addresses[rows]
-            damaged = ~good[rows] if sends else ~good[rows] & anonymous[rows]
-            counts, bad, heard = (np.bincount(of).tolist() for of in (held, held[damaged], held[whole[rows]]))
-            unnamed = [] if sends else np.bincount(held[anonymous[rows]]).tolist()
+            counts, bad, heard = (np.bincount(of).tolist() for of in (held, held[~good[rows]], held[whole[rows]]))
             for address, first in _first_places(held, counts):
                 node = self._node(address)
                 node.sent += counts[address] * sends
                 node.received += counts[address] * (not sends)
-                node.anonymous += unnamed[address] if address < len(unnamed) else 0
-                node.damaged += bad[address] if address < len(bad) else 0
+                node.damaged += bad[address] if sends and address < len(bad) else 0
                 node.heard += heard[address] if sends and address < len(heard) else 0
                 seen.setdefault(address, []).append(int(rows[first]))
             for address, last in _first_places(held[::-1], counts):

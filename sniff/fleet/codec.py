@@ -19,7 +19,7 @@ from sniff.fleet.bus_day import BusDay, Judged, empty_summary
 
 _COUNTS = ("frames", "damaged", "noise", "octets", "searched")
 _NAMED = ("kinds", "damages", "found", "marks")
-_NODE = ("sent", "received", "anonymous", "damaged", "heard", "first", "last", "passed", "unused")
+_NODE = ("sent", "received", "damaged", "heard", "first", "last", "passed", "unused")
 _PLAIN = ("site", "bus", "port", "protocol", "day", "line", "busy", "listened", "first", "last", "latency")
 
 

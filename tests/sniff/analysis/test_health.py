@@ -5,12 +5,15 @@ from __future__ import annotations
 import pytest
 
 from dissectors.findings import Finding, Severity
+from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from dissectors.tracker import Verdict
 from sniff.analysis.health import health_of, station_health, station_of
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
-from sniff.engine.session import LineEventKind
+from sniff.bus.offline import outputs
+from sniff.engine.observer import observe
+from sniff.engine.session import LineEventKind, Session
 
 
 def finding(code: str, subject: str, severity: Severity = Severity.ERROR) -> Finding:
@@ -61,9 +64,6 @@ def test_damaged_frames_are_a_share_of_those_that_could_be_its_own() -> None:
     health = station_health(made)
     assert health is not None
     assert health.reasons == ("10% of its frames damaged (−30)",)
-    of_a_master = station_health(Node(1, sent=40, received=40, anonymous=40, damaged=4, heard=40))
-    assert of_a_master is not None
-    assert of_a_master.reasons == ("5.0% of its frames damaged (−15)",)
 
 
 def test_a_station_that_was_never_asked_and_sent_nothing_has_none() -> None:
@@ -126,3 +126,22 @@ def test_what_holes_explain_is_nobodys() -> None:
     assert (health.bus, {one.score for one in health.stations.values()}) == (health_of(summary(node(1, 50))).bus, {100})
     made.events[LineEventKind.DROPPED], made.events[LineEventKind.NOTE] = 0, 50
     assert health_of(made).stations[1].score < 50
+
+
+def test_damaged_requests_are_no_damage_of_whom_they_ask() -> None:
+    """A master without an address sends them, and the line spoils them."""
+    session = Session("x", LineSettings.parse("19200,8E1"), "modbus-rtu")
+    asks, answers = bytes.fromhex("010300000002C40B"), bytes.fromhex("01030400010002 2A32")
+    items = []
+    for turn in range(20):
+        octets = asks[:-1] + b"\x0c" if turn % 4 == 0 else asks
+        items.append(Chunk((2 * turn + 1) * 100_000_000, octets))
+        if octets == asks:
+            items.append(Chunk((2 * turn + 1) * 100_000_000 + 12_000_000, answers))
+    counted = Summary(session.line)
+    observe(outputs(items, session), counted)
+    (only,) = counted.nodes.present()
+    assert (counted.damaged, only.damaged) == (5, 0)
+    health = station_health(only)
+    assert health is not None
+    assert health.score == 100
