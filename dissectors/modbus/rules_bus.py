@@ -270,7 +270,7 @@ def _of_gaps(seen: BusRecord) -> Iterator[Finding]:
             continue
         words = f"{tally.count} frames with over {fine_milliseconds(timing.t15)} of silence inside"
         yield tally.found(RULES["MB302"], sender, words)
-    if not seen.judges_pauses and seen.stations:
+    if not seen.judges_pauses and seen.stations and timing.has_times:
         words = (
             f"the adapter may hold octets back for {fine_milliseconds(timing.latency)}; limits are "
             f"{fine_milliseconds(timing.t15)} inside a frame and {fine_milliseconds(timing.t35)} between frames"

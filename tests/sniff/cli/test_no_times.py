@@ -112,6 +112,10 @@ def test_findings_have_no_instants(log: Path, sniff485: Run) -> None:
     assert re.search(r": modbus-rtu, .*, 16 frames", sniff485("check", log).out.splitlines()[0])
 
 
+def test_nothing_is_said_of_gaps_that_nobody_measured(log: Path, sniff485: Run) -> None:
+    assert "MB303" not in {json.loads(line)["code"] for line in sniff485("check", "--json", log).out.splitlines()}
+
+
 def test_values_have_no_ages(log: Path, sniff485: Run) -> None:
     latest = [json.loads(line) for line in sniff485("points", "--latest", "--json", log).out.splitlines()]
     assert {one[name] for one in latest for name in ("age s", "changed s", "every ms", "± ms", "a second")} == {None}
