@@ -29,7 +29,10 @@ _DAMAGE = (
 )
 """What damage to frames is told by, in every protocol."""
 
-_DAMAGED = ("MB005", "MB006", "MB007", "MB009", "N2004", "MS401", "MS402")
+_DAMAGED = (
+    *("MB005", "MB006", "MB007", "MB009", "MB011", "MB012", "MB015", "MB021"),
+    *("N2004", "MS401", "MS402"),
+)
 """What tells of damaged frames whose they are, and so tells of their line errors and remains."""
 
 _ALL = (
