@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, counted, together
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.finding_words import note_if, units
 from dissectors.modbus.rules import RULES
+
+_NOT_HEARD = "answers that this tap does not hear: a signal too weak here, or reads that the recording lost"
 
 
 def of_unheard(seen: BusRecord, unheard: Sequence[int]) -> Iterator[Finding]:
@@ -27,4 +30,8 @@ def of_unheard(seen: BusRecord, unheard: Sequence[int]) -> Iterator[Finding]:
             "after an answer, neither waiting nor asking again"
         )
         severity = note_if(seen.rare(count, asked))
-    yield together(one.missing for one in stations).found(RULES["MB020"], "bus", words, severity)
+    finding = together(one.missing for one in stations).found(RULES["MB020"], "bus", words, severity)
+    never = [unit for unit in unheard if seen.stations[unit].last_heard is None]
+    if never and not seen.hears_nobody:  # nothing that it sent proves that it is there
+        finding = replace(finding, means=f"{_NOT_HEARD}; or {units(never)} off, of a master that waits no longer")
+    yield finding

@@ -39,12 +39,14 @@ def turns(bus, count, is_heard):
 def test_answers_missed_of_everybody_are_one_finding_about_the_tap(paper_bus, latency):
     bus = turns(paper_bus(latency=latency), 30, lambda turn, unit: (turn + unit) % 5 > 0)
     assert graves_of(bus) == {("MB020", "bus")}
+    assert not any(" off, of" in one.means for one in findings_of(bus))
 
 
 def test_a_station_that_is_never_heard_is_not_called_absent_where_nobody_waits_for_it(paper_bus):
     bus = turns(paper_bus(), 12, lambda turn, unit: unit != 2)
     assert graves_of(bus) == {("MB020", "bus")}
     assert any("to station 2;" in one.seen for one in findings_of(bus) if one.code == "MB020")
+    assert all("or station 2 off" in one.means for one in findings_of(bus) if one.code == "MB020")
 
 
 def test_where_nobody_is_heard_and_nobody_asked_again_it_is_told_once(paper_bus):
