@@ -17,6 +17,7 @@ from dissectors.line import MS
 from sniff.formats.log_lines import Kind, Line, head_of, line_of, numbers_of
 from sniff.formats.log_margin import NO_MARGIN, Margin, margin_of
 from sniff.formats.log_octets import PAIRS_ONLY
+from sniff.formats.log_rewriting import are_codes, as_codes, with_escapes
 from sniff.formats.log_shapes import Role
 from sniff.formats.log_times import AS_WRITTEN, FASTEST, Times, counted, number_ahead, order_of
 from sniff.formats.usb_serial import STATUS, begin_with_status
@@ -30,6 +31,7 @@ LOOKED_AT_CHARACTERS = 200_000
 WINDOW = 2048
 """Octets within which a line that repeats others is looked for."""
 
+_STRINGS = "byte strings"
 _JOINED, _SHORT = "digits without space", 6
 """Digits of the shortest frame, on lines of which longer ones are known."""
 
@@ -54,7 +56,8 @@ class Plan:
     `spellings`: how octets are written. `margin`, `times`: what is no part of the lines, how their times are read.
     `heads`: those above rows that repeat others. `growing`: labels whose lines tell what was heard so far, so that the
     next has the same with more behind. `labelled`: whether lines with octets have a label; `lower`: whether
-    their digits are small letters; `with_status`: whether what a USB adapter sent begins with its status.
+    their digits are small letters; `with_status`: whether what a USB adapter sent begins with its status; `in_codes`:
+    whether digits behind # are decimal.
     """
 
     kind: str
@@ -73,10 +76,12 @@ class Plan:
     heads: frozenset[str] = frozenset()
     growing: frozenset[str] = frozenset()
     with_status: bool = False
+    in_codes: bool = False
 
     def line(self, text: str) -> Line:
         """A line taken apart as this log writes it."""
         text = self.margin.without(text)
+        text = as_codes(text) if self.in_codes else text
         line = line_of(text, self.base, self.offsets is not None, self.times)
         if self.with_status and _is_of_adapter(line):
             line = replace(line, octets=line.octets[STATUS:], kind=line.kind if line.octets[STATUS:] else Kind.SHAPE)
@@ -85,6 +90,10 @@ class Plan:
             short = line_of(text, self.base, False, self.times, _SHORT)
             if short.family and self.roles.get(short.family) is Role.DATA:
                 return short
+        if line.spelling != _STRINGS and _STRINGS in self.spellings and (escaped := with_escapes(text)) != text:
+            string = line_of(escaped, self.base, False, self.times)
+            if string.bare or self.roles.get(string.family) is Role.DATA:
+                return string
         return line
 
     def role(self, line: Line, recent: bytes) -> Role | None:
@@ -108,8 +117,10 @@ class Plan:
 def plan_of(texts: Sequence[str]) -> Plan | None:
     """The plan for a log that begins so; None when no line of it tells octets."""
     margin = margin_of(texts)
-    found = _plan([margin.without(text) for text in margin.joined(texts)])
-    return replace(found, margin=margin) if found is not None else None
+    plain = [margin.without(text) for text in margin.joined(texts)]
+    in_codes = are_codes(plain)
+    found = _plan([as_codes(text) for text in plain] if in_codes else plain)
+    return replace(found, margin=margin, in_codes=in_codes) if found is not None else None
 
 
 def _plan(texts: Sequence[str]) -> Plan | None:

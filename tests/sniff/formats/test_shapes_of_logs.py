@@ -96,3 +96,39 @@ def test_a_number_that_no_time_can_be(odd: str, tmp_path: Path) -> None:
     times = [item.time for item in read(path).items()]
     assert len(times) == 12
     assert all(0 <= time < 1 << 63 for time in times)
+
+
+def octets_of(path: Path) -> bytes:
+    return b"".join(item.octets for item in read(path).items() if isinstance(item, Chunk))
+
+
+CODES = (bytes((80, 3, 0, 33, 0, 16, 217, 159)), bytes((80, 16, 12, 10, 11, 13, 40, 47)))
+TEXT = b":010300000002FA\r\n"
+
+
+@pytest.mark.parametrize(
+    ("written", "octets"),
+    [
+        ((CODES[0], CODES[1]), "".join(map(chr, b"".join(CODES))).encode("latin-1")),  # two digits, beside others
+        ((TEXT, TEXT), TEXT + TEXT),  # nothing but two digits, and frames of characters
+    ],
+)
+def test_codes_of_two_digits_are_decimal_where_the_log_tells(
+    written: tuple[bytes, ...], octets: bytes, tmp_path: Path
+) -> None:
+    path = tmp_path / "x.log"
+    path.write_text("".join("TX: " + "".join(f"#{octet}" for octet in line) + "\n" for line in written * 4))
+    assert octets_of(path) == octets * 4
+
+
+def test_pairs_behind_a_sign_stay_pairs(tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    path.write_text("TX: #01#03#00#00#00#02#C4#0B\nRX: #01#03#04#00#01#00#02#2A#32\n" * 4)
+    assert octets_of(path) == bytes.fromhex("010300000002C40B 01030400010002 2A32") * 4
+
+
+def test_strings_that_need_no_escape_are_octets_beside_others(tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    heard = (b"P\x03\x00", b"!", b"\x00", b"AB", TEXT[:1], TEXT[1:-2], TEXT[-2:])
+    path.write_text("".join(f"rx {octets!r}\n" for octets in heard * 4) + "opened b'COM7'\n")
+    assert octets_of(path) == b"".join(heard) * 4
