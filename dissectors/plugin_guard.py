@@ -7,10 +7,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from dissectors.frame import Frame, Header, Role
+from dissectors.pseudonyms import Pseudonyms
 
 if TYPE_CHECKING:
     from dissectors.manifest import Dissector
     from dissectors.meaning import Meaning
+    from dissectors.pseudonyms import Renamer
     from dissectors.simulated import SimulatedBus
 
 _Given = TypeVar("_Given")
@@ -80,10 +82,41 @@ def guarded(dissector: Dissector) -> Dissector:
 
             return Raw(frame.octets)
 
+    def renamer() -> Renamer:
+        assert dissector.renamer is not None
+        return _Renaming(dissector.name, dissector.renamer())
+
     def scenarios() -> Mapping[str, SimulatedBus]:
         try:
             return dissector.scenarios()
         except Exception:
             return {}  # its buses cannot be had; those of others can
 
-    return replace(dissector, peek=peek, text=text, meant=meant, fields=fields, packet=packet, scenarios=scenarios)
+    return replace(
+        dissector,
+        peek=peek,
+        text=text,
+        meant=meant,
+        fields=fields,
+        packet=packet,
+        scenarios=scenarios,
+        renamer=None if dissector.renamer is None else renamer,
+    )
+
+
+class _Renaming:
+    """A plug-in's renamer that keeps the length of each frame, or says that it does not: octets would change places."""
+
+    def __init__(self, name: str, rename: Renamer) -> None:
+        self._name, self._rename = name, rename
+        held = getattr(rename, "stations", None)
+        self.stations = held if isinstance(held, Pseudonyms) else None
+
+    def __call__(self, frame: Frame) -> bytes:
+        octets = _of_type(self._rename(frame), bytes)
+        if len(octets) != len(frame.octets):
+            from dissectors.registry import BrokenPlugin
+
+            was, now = len(frame.octets), len(octets)
+            raise BrokenPlugin(f"plug-in {self._name!r} renames a frame of {was} octets to one of {now}")
+        return octets

@@ -38,9 +38,16 @@ class Pseudonyms:
 
 
 class Renamer(Protocol):
-    """What renames the frames of one protocol; each keeps its length, and its damage if it has one."""
+    """What renames the frames of one protocol; each keeps its length, and its damage if it has one.
 
-    stations: Pseudonyms
+    `stations`: the numbers that it gives stations. None where others cannot know them: devices that the capture names
+    by station are left out then.
+    """
+
+    @property
+    def stations(self) -> Pseudonyms | None:
+        """As above; an attribute will do."""
+        ...
 
     def __call__(self, frame: Frame) -> bytes:
         """The octets of the frame under another name."""

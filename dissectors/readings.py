@@ -26,10 +26,11 @@ class Reading:
     """One thing that an exchange told.
 
     `station`: whose thing it is; None when that is the station of the transaction. `space`: which table of the station
-    ("holding", "AI", "analog-input"); `address`: the place in it, as on the wire; `part`: the attribute or property,
-    empty for the value itself. `raw`: the bits as they were on the wire, unsigned; None for text. `sure`: False where
-    no public source confirms the layout. `words`: the value in the protocol's own words, where it has some; `beside`:
-    what came with it, as names and texts.
+    ("holding", "AI", "analog-input"); points of "holding", "input", "coil" and "discrete" are numbered as Modbus'
+    tables are, from 40001, 30001, 00001 and 10001, so that a table of another protocol needs another name. `address`:
+    the place in it, as on the wire; `part`: the attribute or property, empty for the value itself. `raw`: the bits as
+    they were on the wire, unsigned; None for text. `sure`: False where no public source confirms the layout. `words`:
+    the value in the protocol's own words, where it has some; `beside`: what came with it, as names and texts.
     """
 
     space: str

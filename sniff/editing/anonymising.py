@@ -46,9 +46,9 @@ def _renamed_devices(session: Session) -> dict[str, str]:
     known, _ = noted(session)
     stations = _renamer(session).stations
     said = [
-        f"{word if word == EVERY else stations.of(address(word))}={name}"
+        f"{word if word == EVERY or stations is None else stations.of(address(word))}={name}"
         for word, name in known.items()
-        if name in names()
+        if name in names() and (word == EVERY or stations is not None)
     ]
     devices = {DEVICES_NOTE: ",".join(said)} if said else {}
     return {**devices, LINE_NOTE: ASSUMED} if session.line_is_assumed else devices
@@ -60,7 +60,7 @@ def _renamer(session: Session) -> Renamer:
     assert make is not None  # asked before, by `knows`
     rewrite = make()
     for word in noted(session)[0]:
-        if word != EVERY:
+        if rewrite.stations is not None and word != EVERY:
             rewrite.stations.of(address(word))
     return rewrite
 

@@ -136,3 +136,32 @@ def test_a_plug_in_stays_the_same_value(plug: Callable[..., None]) -> None:
     found = replace(registry.get("n2"), name="half")
     plug("half", lambda: found)
     assert registry.get("half") is registry.get("half")
+
+
+class Renames:
+    """A renamer without numbers of stations, that gives what a test wants."""
+
+    def __init__(self, octets: bytes | None = None) -> None:
+        self._octets = octets
+
+    def __call__(self, frame: Any) -> bytes:
+        return frame.octets if self._octets is None else self._octets
+
+
+def test_a_renamer_without_stations_leaves_devices_out(plug: Callable[..., None], tmp_path: Path) -> None:
+    plug("quiet", lambda: replace(registry.get("modbus-rtu"), name="quiet", renamer=Renames))
+    heard, given = tmp_path / "a.cap.txt", tmp_path / "b.cap.txt"
+    heard.write_text("#!sniff-capture 1\n# line: 19200,8E1\n# device: 1=teco-e510\n+5 01 03 00 00 00 02 C4 0B\n")
+    assert main(["anonymise", str(heard), "-o", str(given), "-p", "quiet"]) == 0
+    assert "01 03 00 00 00 02 C4 0B" in given.read_text()
+    assert "teco" not in given.read_text()
+
+
+def test_a_renamed_frame_of_another_length_is_one_line(
+    plug: Callable[..., None], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plug("long", lambda: replace(registry.get("modbus-rtu"), name="long", renamer=lambda: Renames(bytes(9))))
+    heard = tmp_path / "a.hex"
+    heard.write_text("01 03 00 00 00 02 C4 0B\n")
+    assert main(["anonymise", str(heard), "-o", str(tmp_path / "b.cap.txt"), "-p", "long"]) == 2
+    assert capsys.readouterr().err.endswith("sniff485: plug-in 'long' renames a frame of 8 octets to one of 9\n")
