@@ -173,11 +173,14 @@ def _without_service(data: bytes, at: int, pdu: int, role: Role, kind: str) -> t
 
 
 def _instance(data: bytes, at: int) -> int | None:
-    """Instance of the object that the parameters name first (the monitored one in COV notifications)."""
+    """Instance of the object that the parameters name first (the monitored one in COV notifications).
+
+    An object and a process id of four octets look alike; only behind a process id stands another object.
+    """
     size = len(data)
     if at >= size:
         return None
-    if data[at] in (0x0C, 0xC4) and at + 5 <= size:
+    if data[at] in (0x0C, 0xC4) and at + 5 <= size and data[at : at + 6 : 5] != b"\x0c\x1c":
         return int.from_bytes(data[at + 1 : at + 5], "big") & 0x3FFFFF
     if data[at] & 0xF8 == 0x08 and data[at] & 7 <= 4:  # a process id first
         at += 1 + (data[at] & 7)

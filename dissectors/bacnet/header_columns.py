@@ -196,6 +196,7 @@ class _Data:
         begin, at, size = self.begin[rows], parameters[rows], self.size[rows]
         tag = self._octet(begin + at)
         named = ((tag == 0x0C) | (tag == 0xC4)) & (at + 5 <= size)
+        named &= ~((tag == 0x0C) & (at + 5 < size) & (self._octet(begin + at + 5) == 0x1C))  # that is a process id
         self.address[rows[named]] = self._instance(begin[named] + at[named])
         process = ~named & (at < size) & (tag & 0xF8 == 0x08) & (tag & 7 <= 4)
         rows, begin, at, size, tag = rows[process], begin[process], at[process], size[process], tag[process]

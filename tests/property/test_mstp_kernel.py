@@ -107,6 +107,15 @@ def test_a_bad_header_with_a_length_over_the_limit_is_eight_octets() -> None:
         assert_equal(MSTP, [Chunk(buses.START, octets)], Timing(buses.LINE))
 
 
+def test_a_process_id_may_look_like_an_object() -> None:
+    asked = bytes.fromhex("010400050c05")
+    for process in ("0912", "0c12345678", "0c0000001c"):
+        for behind in ("", "1c", "1c00000009", "1c000000092900", "2c000000090900", "190d", "1c1c00000009"):
+            octets = asked + bytes.fromhex(process + behind)
+            chunks = [Chunk(buses.START, frame(5, 1, 2, octets) + frame(0, 1, 2) + frame(5, 1, 2, octets))]
+            assert_equal(MSTP, chunks, Timing(buses.LINE))
+
+
 @settings(max_examples=examples(200), deadline=None)
 @given(st.data(), buses.timings)
 def test_any_traffic(data: st.DataObject, timing: Timing) -> None:

@@ -119,6 +119,11 @@ def test_header_of_every_kind():
         header = peek(frame_of(octets))
         assert (header.kind, header.role, header.function) == (kind, role, octets[2]), octets.hex()
     assert peek(frame_of(frame(5, 1, 2, bytes.fromhex("010400050c0c0c020004d2194d")))).address == 1234
+    monitored = bytes.fromhex("010400050c050912" + "1c00000009" + "2900")
+    for process in ("0912", "0a1234", "0b123456", "0c12345678"):  # four octets look like an object
+        octets = monitored[:6] + bytes.fromhex(process) + monitored[8:]
+        assert peek(frame_of(frame(5, 1, 2, octets))).address == 9
+        assert peek(frame_of(frame(5, 1, 2, octets[:-7]))).address == (0x345678 if process[1] == "c" else None)
     assert peek(frame_of(cases[12][0])).error == "object unknown-property"
     failed = "010050071e1e0c000000011e09551f2e910291202f1f"
     assert peek(frame_of(frame(6, 7, 2, bytes.fromhex(failed)))).error == "one subscription failed"
