@@ -33,6 +33,10 @@ def answers(spread: float, count: int = TURNS_KEPT) -> list[float]:
         ([(100 + 9 * (at % 2), answer) for at, answer in enumerate(answers(30))], False),
         ([(400 if at % 12 == 0 else 100, answer) for at, answer in enumerate(answers(30))], True),  # a few are others
         ([(100, answer) for answer in answers(1)], False),  # both fit
+        ([(100, 20 + answer) for answer in (0, 1.99) * 32], False),
+        ([(100, 20 + answer) for answer in (0, 2) * 32], True),  # answers differ enough to tell
+        ([(100 + 2 * (at % 2), 20 + answer) for at, answer in enumerate((0, 8) * 32)], True),  # four times steadier
+        ([(100 + 2 * (at % 2), 20 + answer) for at, answer in enumerate((0, 7.99) * 32)], False),
         ([(100, answer) for answer in answers(30, count=15)], False),
         ([(100, answer) for answer in answers(30, count=16)], True),
         ([], False),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from dissectors.frame import Noise, Place, Reason
+from dissectors.modbus.cut_echo import CutEcho
 from dissectors.modbus.envelope import seal_rtu
 from dissectors.tracker import Verdict
 from tests.dissectors.modbus.judged import findings_of, graves_of
@@ -56,3 +58,22 @@ def test_a_write_given_back_in_part_again_and_again_is_no_wait_for_its_station(b
     for _ in range(6):
         bus.say(WRITE, 2000).cut(WRITE, 7, 1.0)
     assert graves_of(bus) == {("MB013", "bus")}
+
+
+def test_pieces_are_one_echo_only_together_and_in_time(frame_of):
+    """The first within a limit behind the request, the others within a longer one."""
+    octets = seal_rtu(bytes.fromhex(WRITE))
+    request = frame_of(octets, start=0, end=1000)
+
+    def taken(*pieces: tuple[bytes, int]) -> list[bool]:
+        echo = CutEcho(request, 100)
+        found = [Noise(piece, 1000 + at, 1000 + at, Place.BETWEEN, Reason.NO_FRAME) for piece, at in pieces]
+        return [echo.takes(one, 500) for one in found]
+
+    assert taken((octets[:4], 99), (octets[4:5], 100), (octets[5:7], 499)) == [True, True, True]
+    assert taken((octets[:4], 99), (octets[5:6], 200)) == [True, False]  # one is missing in between
+    assert taken((octets[:4], 99), (octets[:4], 200)) == [True, False]
+    assert taken((octets[:4], 99), (octets[4:], 200)) == [True, False]  # whole, and no cut one
+    assert taken((octets[:4], 100), (octets[4:5], 200)) == [False, False]
+    assert taken((octets[:4], 99), (octets[4:5], 500)) == [True, False]
+    assert not CutEcho().takes(request, 500)

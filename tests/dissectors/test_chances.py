@@ -1,0 +1,39 @@
+"""What is too rare to be worth a warning: the borders of both measures."""
+
+from __future__ import annotations
+
+import pytest
+
+from dissectors.chances import MINUTE, at_least, is_rare
+
+LONG = 1_000_000
+
+
+@pytest.mark.parametrize(
+    ("count", "of", "span", "is_so"),
+    [
+        (1, 1, 1, True),  # one is nothing, whatever it is one of
+        (2, 200, MINUTE, False),  # one in a hundred
+        (2, 201, MINUTE, True),
+        (4, LONG, MINUTE, True),
+        (5, LONG, MINUTE, False),
+        (4, LONG, 1, True),  # less than a minute is one
+        (5, LONG, 0, False),
+        (8, LONG, 2 * MINUTE, True),
+        (9, LONG, 2 * MINUTE, False),
+        (9, LONG, 2 * MINUTE + 1, True),
+        (28, LONG, 10 * MINUTE, True),
+        (29, LONG, 10 * MINUTE, False),
+    ],
+)
+def test_what_is_rare(count: int, of: int, span: int, is_so: bool) -> None:
+    assert is_rare(count, of, span) is is_so
+
+
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.5, 0.9])
+def test_the_tail_goes_on_where_it_is_no_longer_summed(share: float) -> None:
+    for count in (0, 1, 40, 41, 200, 400):
+        assert at_least(count, 401, share) == pytest.approx(at_least(count, 400, share), abs=0.1)
+        assert at_least(count + 1, 400, share) <= at_least(count, 400, share)
+    assert at_least(1, 1000, 0.0) == at_least(1, 10, 0.0) == 0
+    assert at_least(1, 10, 1.0) == 1
