@@ -315,6 +315,8 @@ class Cycles:
             return None
         self._last[octets] = starts[-1]
         self._keys[octets] = key
+        if len(starts) == 1:  # as most do in a stretch
+            return (0, [starts[0] - before]) if before is not None and starts[0] > before else None
         times = starts if before is None else [before, *starts]
         periods = [after - earlier for earlier, after in pairwise(times)]
         first = next((at for at, period in enumerate(periods) if period > 0), None)
@@ -324,7 +326,10 @@ class Cycles:
 
     def keep(self, octets: bytes, periods: list[int]) -> None:
         """Keep periods of a request."""
-        self._periods.setdefault(octets, deque(maxlen=_PERIODS)).extend(periods)
+        kept = self._periods.get(octets)
+        if kept is None:
+            kept = self._periods[octets] = deque(maxlen=_PERIODS)
+        kept.extend(periods)
 
     def asked_of(self, unit: int) -> list[bytes]:
         """What a unit is asked."""
