@@ -18,10 +18,11 @@ class Devices:
     default: Profile | None = None
 
     def at(self, address: int | None) -> Profile | None:
-        """The profile of a station; None stands for all of them: what the rest have, else what each has."""
+        """The profile of a station; None stands for all of them: what the rest have, else what each of several has. Of
+        one station alone nobody knows whether a broadcast is meant for it."""
         if address is not None:
             return self.by_address.get(address, self.default)
-        if self.default is not None or len(self.profiles) != 1:
+        if self.default is not None or len(self.by_address) < 2 or len(self.profiles) != 1:
             return self.default
         return self.profiles[0]
 

@@ -224,6 +224,7 @@ def test_any_readings_decode(name: str, given_readings: list[Reading]) -> None:
 def test_all_devices_have_a_profile_where_each_has_the_same() -> None:
     assert Devices({1: E510, 2: E510}).at(None) is E510
     assert Devices({1: E510, 2: F510}).at(None) is None
+    assert Devices({1: E510}).at(None) is None  # others that nobody described may be meant
     assert Devices({1: E510}, F510).at(None) is F510
     assert Devices({}, F510).at(None) is F510
 
