@@ -201,7 +201,8 @@ class Limits:
     `frame`: octets; `response`: ns; `stations`: the lowest and the highest number that it can be given; `functions`:
     the codes that it knows; `unexecuted`: what it acknowledges and does not do, as the kind of the exchange, or that
     and the kind of object: "release-override", "override:AI". `responses`: ns by rate (Bd), where that differs.
-    `read_only`: attributes and properties that can only be read, with their kind of object: "AI:object-status".
+    `read_only`: attributes and properties that can only be read, with their kind of object: "AI:object-status"; kinds
+    of exchange that do not change the value of a kind of object: "write-attribute:AO".
     """
 
     frame: int | None = None

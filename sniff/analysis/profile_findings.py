@@ -89,7 +89,7 @@ class ProfileFindings:
             station = None if placement.role is Role.BROADCAST else placement.destination
             readings = tuple(reading for reading in self._readings(event, None) if reading.how is Origin.WRITE)
             if not self._remember_vain(no, event, header, placement, readings) and readings:
-                self._judge_writes(no, event, station, readings)
+                self._judge_writes(no, event, station, readings, "" if header is None else header.kind)
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
@@ -105,7 +105,7 @@ class ProfileFindings:
             seen = f"{vain.words}: acknowledged, and not executed by this device"
             self._add("PR010", _subject(profile, transaction.station), vain.words, seen, transaction.end, vain.no)
         elif vain.readings:
-            self._judge_writes(vain.no, vain.frame, transaction.station, vain.readings)
+            self._judge_writes(vain.no, vain.frame, transaction.station, vain.readings, transaction.kind)
 
     def _remember_vain(
         self, no: int, frame: Frame, header: Header | None, placement: Placement, readings: tuple[Reading, ...]
@@ -179,7 +179,9 @@ class ProfileFindings:
             seen = f"asked with function {code:02X} (hex); its manual lists {listed}"
             self._add("PR009", _subject(profile, station), f"{code}", seen, frame.end, no)
 
-    def _judge_writes(self, no: int, frame: Frame, station: int | None, readings: tuple[Reading, ...]) -> None:
+    def _judge_writes(
+        self, no: int, frame: Frame, station: int | None, readings: tuple[Reading, ...], kind: str
+    ) -> None:
         profile = self._devices.at(station)
         if profile is None:
             return
@@ -194,6 +196,9 @@ class ProfileFindings:
                 place = profile.number_of(reading.space, reading.address)
                 if profile.forbids(reading.space, reading.address, reading.raw):
                     self._add("PR002", who, place, f"{reading.value} written to reserved {place}", frame.end, no)
+            elif not reading.part and f"{kind}:{reading.space}" in profile.limits_on(self._family).read_only:
+                place = f"{reading.space} {reading.address}"
+                self._add("PR003", who, place, f"{place} written by {kind}, which does not change it", frame.end, no)
             elif f"{reading.space}:{reading.part}" in profile.limits_on(self._family).read_only:
                 place = f"{reading.space} {reading.address} {reading.part}"
                 self._add("PR003", who, place, f"{place} written, it is read only", frame.end, no)

@@ -10,7 +10,10 @@ from typing import Any
 
 import pytest
 
+from dissectors import registry
 from dissectors.findings import Finding, Severity
+from dissectors.frame import Chunk
+from dissectors.line import LineSettings
 from dissectors.profiles import Devices
 from dissectors.profiles.decoding import decode
 from dissectors.profiles.packaged import packaged, parse_text
@@ -24,6 +27,7 @@ from sniff.analysis.summary import Summary
 from sniff.bus.offline import outputs
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import Session
 from sniff.simulation.scenarios import scenario, simulate
 
 E510 = Devices(default=packaged("teco-e510"))
@@ -325,3 +329,25 @@ def test_what_is_written_while_the_drive_runs(exchanges: tuple[tuple[str, str], 
     assert [finding.seen for finding in found] == [
         "save parameters (03E0h) written while its state was forward; it is taken while stopped"
     ] * told
+
+
+@pytest.mark.parametrize(
+    ("command", "found"),
+    [
+        ("01230103" + "41200000", [("PR003", "drive 1", "AO 1 written by write-attribute, which does not change it")]),
+        ("01720301" + "41200000", []),
+        ("01230101" + "00", []),  # its configuration
+    ],
+)
+def test_the_value_of_an_output_takes_an_override_to_change(command: str, found: list[tuple[str, str, str]]) -> None:
+    n2 = registry.get("n2")
+    session = Session("x", LineSettings.parse("9600,8N1"), "n2")
+    judge = ProfileFindings(session.timing, n2, Devices(default=packaged("teco-f510")))
+    items = [Chunk(10**9, n2.makers["n2"](text=command)), Chunk(10**9 + 20_000_000, b"A\r")]
+    for output in outputs(items, session):
+        assert isinstance(output, Output)
+        for row in output.rows:
+            judge.see(row.no, row.event, row.header, row.placement)
+        for transaction in output.transactions:
+            judge.settle(transaction)
+    assert brief(judge.findings()) == found
