@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dissectors.findings import Finding, Rule, Severity, counted, from_the_root, times, under_causes, with_consequences
+from dissectors.findings import (
+    EVIDENCE_MAX,
+    Finding,
+    Rule,
+    Severity,
+    Tally,
+    counted,
+    from_the_root,
+    times,
+    together,
+    under_causes,
+    with_consequences,
+)
 
 RULES = {
     "XX1": Rule("XX1", Severity.ERROR, "two senders", "", explains=("XX2", "YY")),
@@ -120,3 +132,19 @@ def test_what_names_its_own_cause_and_what_is_told_by_a_mere_consequence_stand_f
     assert after(apart, finding("XX2", "bus"))["ZZ1", "bus"] == apart
     made = after(finding("ZZ1", "bus"), finding("XX2", "bus"), finding("XX1", "bus"))
     assert (made["ZZ1", "bus"].cause, made["XX2", "bus"].cause) == (None, ("XX1", "bus"))
+
+
+def test_many_are_counted_as_one_by_one_whatever_their_times() -> None:
+    groups = ([50, 20, 90], [], [10], [70, 200, 3], list(range(100, 120)))
+    one_by_one, at_once, apart, no = Tally(), Tally(), [], 0
+    for group in groups:
+        frames = range(no, no + len(group))
+        no += len(group)
+        for frame, time in zip(frames, group, strict=True):
+            one_by_one.add(time, frame)
+        at_once.add_many(group, frames)
+        apart.append(Tally())
+        apart[-1].add_many(group, frames)
+        assert at_once == one_by_one == together(apart)
+    assert (at_once.count, at_once.first, at_once.last) == (27, 3, 200)
+    assert at_once.evidence == list(range(EVIDENCE_MAX))

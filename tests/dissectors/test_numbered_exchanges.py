@@ -60,3 +60,14 @@ def test_the_same_again_is_a_repeat_and_another_is_not() -> None:
     exchanges.ask(7, 4, frame(b"a", 2), header(Role.REQUEST))
     exchanges.ask(7, 5, frame(b"b", 3), header(Role.REQUEST))
     assert exchanges.answer(7, 6, frame(b"x", 3.5), header(Role.RESPONSE)).verdict is Verdict.ANSWERED
+
+
+def test_an_answer_may_take_as_long_as_patience_lasts() -> None:
+    exchanges = NumberedExchanges(10 * S, MOST)
+    exchanges.ask(7, 1, frame(b"a", 5), header(Role.REQUEST))
+    exchanges.ask(8, 2, frame(b"b", 6), header(Role.REQUEST))
+    end = 5 * S + 1000
+    assert exchanges.advance(end + 10 * S) == ()
+    (over,) = exchanges.advance(end + 10 * S + 1)
+    assert (over.request, over.verdict) == (1, Verdict.NO_RESPONSE)
+    assert exchanges.is_open(8)

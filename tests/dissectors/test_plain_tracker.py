@@ -7,7 +7,7 @@ import pytest
 from dissectors.frame import Chunk, Frame, Noise, Place, Reason
 from dissectors.line import MS, LineSettings, Timing
 from dissectors.plain_tracker import PATIENCE, Polling
-from dissectors.tracker import Transaction, Verdict
+from dissectors.tracker import Announcements, Transaction, Verdict
 from tests.dissectors.gong import framer, peek, seal
 
 LATENCY = 16 * MS
@@ -46,7 +46,9 @@ def heard(*talk: tuple[int, bytes], until: int = 0) -> list[Transaction]:
     ],
 )
 def test_what_becomes_of_a_request(talk: tuple[tuple[int, bytes], ...], verdicts: list[str]) -> None:
-    assert [one.verdict.value for one in heard(*talk)] == verdicts
+    closed = heard(*talk)
+    assert [one.verdict.value for one in closed] == verdicts
+    assert len({one.id for one in closed}) == len(closed)
 
 
 def test_an_answer_says_how_long_it_took_within_what_the_adapter_allows() -> None:
@@ -78,3 +80,14 @@ def test_the_end_leaves_a_request_open_and_noise_is_placed_nowhere() -> None:
     assert tracker.track(2, Noise(b"x", 200 * MS, 201 * MS, Place.BETWEEN, Reason.NO_FRAME), None).placement is None
     assert [one.verdict for one in tracker.close()] == [Verdict.OPEN]
     assert tracker.close() == ()
+
+
+def test_what_is_told_to_everybody_is_a_transaction_of_its_own() -> None:
+    tracker, framing = Announcements(TIMING), framer(TIMING)
+    events = [event for time in (100, 200) for event in framing.feed(Chunk(time * MS, READ))]
+    made = [tracker.track(no, event, peek(event)) for no, event in enumerate(events, 1) if isinstance(event, Frame)]
+    assert [one.id for each in made for one in each.closed] == [1, 2]
+    assert [(each.placement.no, each.placement.tx) for each in made if each.placement] == [(1, 1), (2, 2)]
+    assert {one.verdict for each in made for one in each.closed} == {Verdict.DATA}
+    assert tracker.track(3, Noise(b"x", 0, 1, Place.BETWEEN, Reason.NO_FRAME), None).placement is None
+    assert (tracker.advance(10**12), tracker.close()) == ((), ())

@@ -60,3 +60,11 @@ def test_a_false_start_does_not_swallow_the_frame_behind_it() -> None:
 def test_a_start_begins_a_frame_always() -> None:
     good = bracket(b"abc")
     assert frames(delimited(Timing()), b"<ab" + good) == [(b"<ab", False), (good, True)]
+
+
+def test_a_frame_cut_anywhere_is_a_damaged_frame() -> None:
+    """Also where its header is not whole, and its length not known."""
+    for framer, whole in ((lengthy, count(b"hello")), (delimited, bracket(b"abc"))):
+        for cut in range(1, len(whole)):
+            assert frames(framer(Timing()), whole[:cut]) == [(whole[:cut], False)], cut
+            assert frames(framer(Timing()), whole + whole[:cut]) == [(whole, True), (whole[:cut], False)]

@@ -77,6 +77,17 @@ def test_what_a_frame_says() -> None:
     assert BACNET_IP.packet(ask, Role.REQUEST).haslayer("NPDU")
 
 
+def test_a_broadcast_that_a_router_passes_on_is_of_the_device_that_sent_it() -> None:
+    i_am = bytes.fromhex("0120ffff00ff1000c4020000052201e0910021ff")
+    passed_on, plain = frames_of(make_ip(HERE, EVERYBODY, 0x04, THERE + i_am), make_ip(THERE, EVERYBODY, 0x0B, i_am))
+    header, itself = BACNET_IP.peek(passed_on), BACNET_IP.peek(plain)
+    assert (header.kind, header.source, header.destination) == ("i-am", 9, 255)
+    assert (itself.kind, itself.source, itself.destination) == ("i-am", 9, 255)
+    assert "device,5" in BACNET_IP.text(passed_on, header, Role.BROADCAST)
+    cut = make_ip(HERE, EVERYBODY, 0x04, THERE)
+    assert BACNET_IP.peek(frames_of(cut)[0]).kind == "forwarded-npdu"
+
+
 @given(
     octets=st.one_of(
         st.binary(max_size=60),

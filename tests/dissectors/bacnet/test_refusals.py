@@ -15,7 +15,9 @@ OPTIONAL = ("description", "location", "profile-name", "active-cov-subscriptions
 READ = "read-property"
 
 
-def asked(mac: int, name: str) -> Event:
+def asked(mac: int, name: str) -> Event | None:
+    if not name:
+        return None
     octets = npdu_frame(mac, 1, read_property(1, f"device,{mac}", name), expects_reply=True)
     (request,) = script([(1, octets)]).events
     return request
@@ -53,3 +55,9 @@ def test_each_thing_asked_for_once_is_a_search():
 def test_an_error_that_is_no_matter_of_what_there_is_stays_each_stations_own():
     both = found({3: OPTIONAL, 7: OPTIONAL}, "device operational-problem")
     assert both == [("MAC 3", Severity.WARNING, 4), ("MAC 7", Severity.WARNING, 4)]
+
+
+def test_what_was_asked_for_is_not_known_and_may_be_the_same_again():
+    unknown = OPTIONAL[0], "", OPTIONAL[1], ""
+    assert found({7: unknown}, answered={3: 8}) == [("MAC 7", Severity.WARNING, 4)]
+    assert found({7: ("",)}, answered={3: 8}) == [("MAC 7", Severity.NOTE, 1)]
