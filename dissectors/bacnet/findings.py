@@ -12,7 +12,8 @@ from dissectors.bacnet.findings_of_refusals import REFUSED_KEPT, Refusals
 from dissectors.bacnet.findings_of_tokens import silences, tokens
 from dissectors.bacnet.findings_of_use import polls, use
 from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
-from dissectors.bacnet.ring import COARSE_LIMIT, Happened, Ring, RingEventKind, RingNode, lies_between
+from dissectors.bacnet.ring import COARSE_LIMIT, Ring, RingNode, lies_between
+from dissectors.bacnet.ring_events import Happened, RingEventKind
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.bacnet.ring_window import MstpRingWindow
 from dissectors.bacnet.rules import RULES
@@ -126,18 +127,16 @@ def _holders(ring: Ring) -> Iterable[Remark]:
             yield plain("MS110", ring, mac, seen, rounds)
         unasked = ring.of(RingEventKind.UNASKED, mac)
         if unasked.count and not (node.is_master and mac <= MAX_MASTER) and ring.shows_tokens:
-            held = sorted({event.other for event in unasked.events if event.other is not None})
             why = "an address above 127 can have no token" if mac > MAX_MASTER else "it never gets a token"
-            seen = f"sent {times(unasked.count)} without being asked, while MAC {listed(held)} had the token; {why}"
-            yield of("MS111", mac, seen, unasked, Severity.NOTE if unasked.count == 1 else None)
+            seen = f"sent {times(unasked.count)} without being asked, while MAC {listed(unasked.parties)} had the token"
+            yield of("MS111", mac, f"{seen}; {why}", unasked, Severity.NOTE if unasked.count == 1 else None)
 
 
 def _for_others(ring: Ring) -> Iterable[Remark]:
     """Those who answer what others are asked."""
     for (what, mac), happened in ring.happened.items():
         if what is RingEventKind.FOR_ANOTHER:
-            asked = listed(sorted({event.other for event in happened.events if event.other is not None}))
-            seen = f"answered {times(happened.count)} what MAC {asked} was asked"
+            seen = f"answered {times(happened.count)} what MAC {listed(happened.parties)} was asked"
             yield of("MS306", mac, seen, happened, Severity.NOTE if happened.count < FOR_OTHERS_LEAST else None)
 
 
@@ -205,8 +204,7 @@ def _times(ring: Ring) -> Iterable[Remark]:
             continue
         for (what, mac), happened in ring.happened.items():
             if what is kind:
-                most = max((event.value or 0 for event in happened.events), default=0)
-                seen = words.format(times=times(happened.count), most=measured(most))
+                seen = words.format(times=times(happened.count), most=measured(happened.most))
                 node = ring.nodes.get(mac, RingNode()) if mac is not None else RingNode()
                 is_reply = what is RingEventKind.LATE_REPLY
                 answers = node.replies if is_reply else node.poll_replies_sent
@@ -240,17 +238,15 @@ def _late_uses(ring: Ring) -> Iterable[Remark]:
             )
             evidence = late.merge(given_up)
         if given_up.count:
-            most = max((event.value or 0 for event in given_up.events), default=0)
             words.append(
                 f"{times(given_up.count)} only after its neighbour had taken the token back, up to "
-                f"{measured(most)} "
+                f"{measured(given_up.most)} "
                 "after it came: two tokens for a moment"
             )
         both = ring.of(RingEventKind.USED_BOTH, mac)
         if _uses_both(ring, mac, node):
-            most = max((event.value or 0 for event in both.events), default=0)
             words.append(
-                f"{times(both.count)} only after its neighbour had repeated the token, up to {measured(most)} "
+                f"{times(both.count)} only after its neighbour had repeated the token, up to {measured(both.most)} "
                 "after it came, and then it used the repeated one too, while the next station sent"
             )
             evidence = evidence.merge(both)

@@ -7,7 +7,8 @@ from dataclasses import replace
 from math import sqrt
 
 from dissectors.bacnet.findings_of_use import has_two_rhythms
-from dissectors.bacnet.ring import Happened, Ring, RingEventKind, RingNode
+from dissectors.bacnet.ring import Ring, RingNode
+from dissectors.bacnet.ring_events import Happened, RingEventKind
 from dissectors.bacnet.ring_remarks import Remark, listed, of, plain, subject
 from dissectors.bacnet.rules import RULES
 from dissectors.chances import is_rare

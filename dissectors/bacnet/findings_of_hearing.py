@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from dissectors.bacnet.ring import Happened, Ring, RingEvent, RingEventKind
+from dissectors.bacnet.ring import Ring
+from dissectors.bacnet.ring_events import Happened, RingEvent, RingEventKind
 from dissectors.bacnet.ring_remarks import Remark, listed, of
 from dissectors.bacnet.unheard import HASTY
 from dissectors.findings import Severity, counted, times
@@ -97,7 +99,7 @@ def _without(happened: Happened, second: Mapping[int, Happened]) -> Happened:
     events = tuple(event for event in happened.events if event.other not in second)
     if len(events) == len(happened.events):
         return happened
-    return replace(happened, count=len(events), events=events)
+    return replace(happened, count=len(events), events=events, others=Counter(event.other for event in events))
 
 
 def _is_mute(ring: Ring, mac: int, happened: Happened) -> bool:

@@ -6,7 +6,8 @@ from collections.abc import Iterable
 
 from dissectors.bacnet.findings_of_hearing import hasty, unheard_share
 from dissectors.bacnet.limits import MAX_MASTER, T_ALL_SILENT
-from dissectors.bacnet.ring import Happened, Ring, RingEventKind
+from dissectors.bacnet.ring import Ring
+from dissectors.bacnet.ring_events import Happened, RingEventKind
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.findings import Severity, counted, times
 
@@ -32,15 +33,14 @@ def tokens(ring: Ring) -> Iterable[Remark]:
             if gone and not _comes_back(ring, mac, happened.last):
                 seen = "did not use its token, was passed over, and has been silent since"
                 yield of("MS106", mac, seen, happened)
-    strays = [happened for (what, _), happened in ring.happened.items() if what is RingEventKind.TWO_TOKENS]
-    strays += hasty(ring).values()
-    total = sum(happened.count for happened in strays)
-    if total >= 2 and ring.shows_tokens and total > STRAYS_SHARE * unheard_share(ring) * ring.frames:
-        together = strays[0]
-        for happened in strays[1:]:
-            together = together.merge(happened)
-        who = sorted({event.mac for event in together.events if event.mac is not None})
-        seen = f"MAC {listed(who)} sent {times(total)} while another one had the token"
+    strays = [(mac, happened) for (what, mac), happened in ring.happened.items() if what is RingEventKind.TWO_TOKENS]
+    strays += hasty(ring).items()
+    together = Happened()
+    for _, happened in strays:
+        together = together.merge(happened)
+    if together.count >= 2 and ring.shows_tokens and together.count > STRAYS_SHARE * unheard_share(ring) * ring.frames:
+        who = sorted({mac for mac, _ in strays if mac is not None})
+        seen = f"MAC {listed(who)} sent {times(together.count)} while another one had the token"
         yield Remark(who[0] if len(who) == 1 else None, of("MS104", None, seen, together).finding)
     for mac, node in ring.nodes.items():
         if node.polls_sent > ALONE_POLLS and not node.tokens_sent and not node.tokens_received:
@@ -54,11 +54,10 @@ def silences(ring: Ring) -> Iterable[Remark]:
     if lost.count:
         seen.append(_lost(lost, _unheld(lost)))
     if all_silent.count:
-        longest = max((event.value or 0 for event in all_silent.events), default=0)
         seen.append(
-            f"{times(all_silent.count)} nothing was sent for up to {measured(longest)}, and then the ring went on "
-            "where it was, without a search for a successor: all stations were silent together, or only this tap heard "
-            "nothing"
+            f"{times(all_silent.count)} nothing was sent for up to {measured(all_silent.most)}, and then the ring went "
+            "on where it was, without a search for a successor: all stations were silent together, or only this tap "
+            "heard nothing"
         )
     if seen:
         both = lost.merge(all_silent)
@@ -66,23 +65,22 @@ def silences(ring: Ring) -> Iterable[Remark]:
 
 
 def _lost(happened: Happened, whose: str) -> str:
-    longest = max((event.value or 0 for event in happened.events), default=0)
-    makers = sorted({event.other for event in happened.events if event.other is not None})
     return (
-        f"the token was lost {times(happened.count)}; {whose}; silence up to {measured(longest)}; begun anew by MAC "
-        f"{listed(makers)}"
+        f"the token was lost {times(happened.count)}; {whose}; silence up to {measured(happened.most)}; begun anew by "
+        f"MAC {listed(happened.parties)}"
     )
 
 
 def _unheld(happened: Happened) -> str:
     """Why no station is named for lost tokens."""
-    of_all = sum((event.value or 0) >= T_ALL_SILENT for event in happened.events)
     all_silent = (
         f"all stations were silent together, longer than {measured(T_ALL_SILENT)}, which no master that is alive "
         "leaves: their supply, the line or the tap"
     )
     disturbed = "who had it is not known, octets that are no good frame came first, or no other master began in time"
-    return all_silent if of_all == len(happened.events) else f"{disturbed}; or {all_silent}" if of_all else disturbed
+    if happened.least >= T_ALL_SILENT:
+        return all_silent
+    return f"{disturbed}; or {all_silent}" if happened.most >= T_ALL_SILENT else disturbed
 
 
 def _comes_back(ring: Ring, mac: int, left: int) -> bool:

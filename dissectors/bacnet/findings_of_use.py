@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from dissectors.bacnet.limits import N_POLL, T_USAGE_DELAY, T_USAGE_TIMEOUT_MAX
-from dissectors.bacnet.ring import Ring, RingEventKind, RingNode
+from dissectors.bacnet.ring import Ring, RingNode
+from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.bacnet.ring_questions import T_GO_ON
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain, share_of_polls
 from dissectors.bacnet.rules import RULES
@@ -48,11 +49,10 @@ def polls(ring: Ring) -> Iterable[Remark]:
             )
         stopped = ring.of(RingEventKind.STOPPED, mac)
         if stopped.count > 1:
-            longest = max(event.value or 0 for event in stopped.events)
             seen.append(
                 f"{times(stopped.count)} it polled up to {node.highest_polled} for a successor after a loss, and "
                 "the bus "
-                f"stood still for up to {measured(longest)}"
+                f"stood still for up to {measured(stopped.most)}"
             )
         if seen:
             words = "; ".join(seen)

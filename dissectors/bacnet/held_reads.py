@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.limits import MS, T_USAGE_DELAY
-from dissectors.bacnet.ring import RingEvent
+from dissectors.bacnet.ring_events import RingEvent
 from dissectors.frame import Frame
 
 _MOST = 8

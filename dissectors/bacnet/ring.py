@@ -9,95 +9,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import Enum
 from types import MappingProxyType
 from typing import Any
 
 from dissectors.bacnet.limits import MAX_MASTER, T_REPLY_DELAY, T_USAGE_DELAY, TURNAROUND_BITS
+from dissectors.bacnet.ring_events import EVENTS_MAX, Happened, RingEventKind
 from dissectors.histogram import Histogram
 from dissectors.line import Timing
 from dissectors.wrong_checks import WrongChecks
 
-EVENTS_MAX = 32
 IMPOSSIBLE_SHARE = 0.01
 COARSE_LIMIT = 100_000_000
 """Limits from here on can be judged with coarse times too (systems that stamp every 16 ms)."""
 
 
-class RingEventKind(Enum):
-    """Kinds of events on a ring."""
-
-    LOST_TOKEN = "lost token"  # silence of 500 ms and more, then somebody began anew
-    ALL_SILENT = "all silent"  # the same silence, then the ring went on where it was
-    RETRY = "token repeated"
-    TWO_TOKENS = "sent without having the token"
-    REJOINED = "answered a poll though already in the ring"
-    LEFT = "gave no sign when given the token"
-    OTHER_DEVICE = "another device instance under the same address"
-    SECOND_DEVICE = "two device instances in turns under the same address"
-    OTHER_ECHO = "a test of the own address answered with other octets"
-    DAMAGED_REPLY = "damaged octets in place of an answer"
-    TOO_SOON = "sent again before its own poll could be answered"
-    FOR_ANOTHER = "answered what another station was asked"
-    UNASKED = "sent without being asked, and never has the token"
-    LATE_USE = "late to use the token"
-    LATE_ASKING = "late to use the token, and asked with it"
-    GIVEN_UP = "used the token after it was given up"
-    USED_BOTH = "used the token and its repeat"
-    SLOW_SEARCH = "late to go on after a poll that nobody answered"
-    STOPPED = "searched for a successor for over a second"
-    STORM = "one of many broadcasts in a short time"
-    LATE_REPLY = "late to answer"
-    NO_REPLY = "no answer"
-    LATE_POLL_REPLY = "late to answer a poll"
-    ILLEGAL = "an address or length that the standard forbids"
-    BROADCAST_REQUEST = "a broadcast that asks for a reply"
-    UNHEARD = "sent what was not heard here"
-    SELF_TOKEN = "passed the token to itself"
-
-
 def lies_between(mac: int, first: int, last: int) -> bool:
     """Whether an address comes after `first` and before `last` in the order of the ring."""
     return 0 < (mac - first) % (MAX_MASTER + 1) < ((last - first) % (MAX_MASTER + 1) or MAX_MASTER + 1)
-
-
-@dataclass(frozen=True, slots=True)
-class RingEvent:
-    """What happened at `time`, in frame `no`, about `mac`; `other` is a second party, `value` ns or a number."""
-
-    what: RingEventKind
-    time: int
-    no: int
-    mac: int | None
-    other: int | None = None
-    value: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Happened:
-    """All events of one kind about one station: how many, when, and the first EVENTS_MAX of them."""
-
-    count: int = 0
-    first: int = 0
-    last: int = 0
-    events: tuple[RingEvent, ...] = ()
-
-    def add(self, event: RingEvent) -> Happened:
-        """One more."""
-        events = (*self.events, event) if len(self.events) < EVENTS_MAX else self.events
-        first = event.time if not self.count else min(self.first, event.time)
-        return Happened(self.count + 1, first, max(self.last, event.time) if self.count else event.time, events)
-
-    def merge(self, other: Happened) -> Happened:
-        """Both together."""
-        if not self.count or not other.count:
-            return self if self.count else other
-        return Happened(
-            self.count + other.count,
-            min(self.first, other.first),
-            max(self.last, other.last),
-            (self.events + other.events)[:EVENTS_MAX],
-        )
 
 
 @dataclass(frozen=True, slots=True)

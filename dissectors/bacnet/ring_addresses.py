@@ -5,7 +5,7 @@ from __future__ import annotations
 from dissectors.bacnet import message as messages
 from dissectors.bacnet.frame_types import FrameType, is_encoded
 from dissectors.bacnet.limits import BROADCAST, MAX_DATA, MAX_MASTER
-from dissectors.bacnet.ring import EVENTS_MAX, RingEventKind
+from dissectors.bacnet.ring_events import EVENTS_MAX, RingEventKind
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
 from dissectors.bacnet.values import ObjectId
 from dissectors.frame import Frame

@@ -14,9 +14,10 @@ from dissectors.bacnet.frame_types import CARRIES_NPDU, EXPECTING, PROPRIETARY, 
 from dissectors.bacnet.header import is_whole_header
 from dissectors.bacnet.limits import BROADCAST, MAX_MASTER, N_MIN_OCTETS, T_NO_TOKEN
 from dissectors.bacnet.lost_tokens import breaks_off
-from dissectors.bacnet.ring import Ring, RingEventKind
+from dissectors.bacnet.ring import Ring
 from dissectors.bacnet.ring_addresses import check_addresses, see_i_am
 from dissectors.bacnet.ring_damage import count_damage, speaker_of
+from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.bacnet.ring_questions import AskedInRing
 from dissectors.bacnet.ring_tally import NodeTally
 from dissectors.bacnet.ring_window import Happening, MstpRingWindow, RingJournal

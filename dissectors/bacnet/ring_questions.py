@@ -10,7 +10,7 @@ from dissectors.bacnet.frame_types import CARRIES_NPDU, PROPRIETARY, FrameType
 from dissectors.bacnet.held_reads import HeldReads, surely_over
 from dissectors.bacnet.limits import MAX_MASTER, MS, T_NO_TOKEN, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.message import data_of, more_follows
-from dissectors.bacnet.ring import RingEvent, RingEventKind
+from dissectors.bacnet.ring_events import RingEvent, RingEventKind
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
 from dissectors.bacnet.ring_window import Happening
 from dissectors.bacnet.unheard import UnheardFrames
@@ -208,7 +208,7 @@ class RingQuestions:
         if took > T_LATE_ANSWER:
             return False
         if asked.missed:
-            self._tally.take_back(RingEventKind.NO_REPLY, asked.no, source)
+            self._tally.take_back(RingEventKind.NO_REPLY, asked.no, source, destination)
         if not asked.answered and took > T_REPLY_DELAY:  # sooner is in time, however soon the other one went on
             self._tally.note(RingEventKind.LATE_REPLY, frame.start, no, source, destination, took)
         return True

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from dissectors.bacnet.ring import Happened, Ring
+from dissectors.bacnet.ring import Ring
+from dissectors.bacnet.ring_events import Happened
 from dissectors.bacnet.rules import RULES
 from dissectors.findings import EVIDENCE_MAX, Finding, Severity, found
 from dissectors.words import duration
@@ -61,10 +62,9 @@ def subject(mac: int | None) -> str:
 
 
 def _pair(happened: Happened, mac: int | None) -> str:
-    others = {event.other for event in happened.events}
-    if mac is not None and len(others) == 1 and (other := others.pop()) is not None:
-        return f"{other} → {mac}"
-    return subject(mac)
+    if mac is None or len(happened.others) != 1 or not happened.parties:
+        return subject(mac)
+    return f"{happened.parties[0]} → {mac}"
 
 
 def share_of_polls(ring: Ring) -> str:

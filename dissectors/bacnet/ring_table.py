@@ -11,7 +11,8 @@ from dissectors.token_ring import Cell
 from dissectors.words import milliseconds
 
 if TYPE_CHECKING:
-    from dissectors.bacnet.ring import Ring, RingEventKind
+    from dissectors.bacnet.ring import Ring
+    from dissectors.bacnet.ring_events import RingEventKind
 
 HEADINGS = (
     "MAC",
@@ -47,7 +48,7 @@ def rows(ring: Ring) -> list[tuple[Cell, ...]]:
 
 
 def _row(ring: Ring, mac: int, following: int | None) -> tuple[Cell, ...]:
-    from dissectors.bacnet.ring import RingEventKind  # a bus of which nobody asks for the ring has none
+    from dissectors.bacnet.ring_events import RingEventKind  # a bus of which nobody asks for the ring has none
 
     node = ring.nodes[mac]
     times = (

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from dissectors.bacnet.ring import SUMS, Edge, Happened, Ring, RingEvent, RingEventKind, RingNode
+from dissectors.bacnet.ring import SUMS, Edge, Ring, RingNode
+from dissectors.bacnet.ring_events import Happened, RingEvent, RingEventKind
 from dissectors.bacnet.ring_window import Happening, RingJournal
 from dissectors.histogram import Histogram
 from dissectors.line import Timing
@@ -147,13 +148,11 @@ class RingTally:
         if self.journal is not None:
             self.journal.note(what, no, mac, value)
 
-    def take_back(self, what: RingEventKind, no: int, mac: int | None) -> None:
+    def take_back(self, what: RingEventKind, no: int, mac: int | None, other: int | None) -> None:
         """What was noted of frame `no` turned out to be nothing."""
         happened = self.happened.get((what, mac))
-        if happened is None:
-            return
-        events = tuple(event for event in happened.events if event.no != no)
-        self.happened[what, mac] = replace(happened, count=max(0, happened.count - 1), events=events)
+        if happened is not None:
+            self.happened[what, mac] = happened.without(no, other)
 
     def value(self) -> Ring:
         """All that was counted so far."""

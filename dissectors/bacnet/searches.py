@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dissectors.bacnet.limits import MS
-from dissectors.bacnet.ring import RingEventKind
+from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
 from dissectors.frame import Frame
 

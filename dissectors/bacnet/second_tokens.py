@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from dissectors.bacnet.limits import T_NO_TOKEN
-from dissectors.bacnet.ring import RingEventKind
+from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.bacnet.ring_tally import RingTally
 from dissectors.frame import Frame
 

@@ -14,7 +14,7 @@ from dissectors.bacnet.held_reads import UNNAMED_TICK, HeldReads
 from dissectors.bacnet.limits import BROADCAST, MAX_MASTER, T_NO_TOKEN, T_USAGE_DELAY, T_USAGE_TIMEOUT, TURNAROUND_BITS
 from dissectors.bacnet.lost_tokens import longest_wait, makes_token
 from dissectors.bacnet.repeated_token import RepeatedToken
-from dissectors.bacnet.ring import RingEvent, RingEventKind
+from dissectors.bacnet.ring_events import RingEvent, RingEventKind
 from dissectors.bacnet.ring_questions import RingQuestions, is_proprietary_answer, is_second_answer
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
 from dissectors.bacnet.ring_window import Happening

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from dissectors.bacnet.frame_types import EXPECTING, HEADER, FrameType
 from dissectors.bacnet.limits import MS, T_REPLY_DELAY, T_USAGE_DELAY
-from dissectors.bacnet.ring import RingEventKind, lies_between
+from dissectors.bacnet.ring import lies_between
+from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.bacnet.ring_tally import RingTally
 from dissectors.frame import Frame
 
@@ -75,7 +76,7 @@ class UnheardFrames:
         if supposed is None:
             return False
         no, time, other = supposed
-        self._tally.take_back(RingEventKind.UNHEARD, no, source)
+        self._tally.take_back(RingEventKind.UNHEARD, no, source, other)
         self._tally.note(RingEventKind.TWO_TOKENS, time, no, other, source)
         return True
 

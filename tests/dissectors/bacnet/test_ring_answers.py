@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dissectors.bacnet.envelope import frame
-from dissectors.bacnet.ring import RingEventKind
+from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.findings import Severity
 from tests.dissectors.bacnet.make_ring_captures import (
     VALUE,

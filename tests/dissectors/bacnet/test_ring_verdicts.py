@@ -6,7 +6,7 @@ import pytest
 
 from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.frame_types import FrameType
-from dissectors.bacnet.ring import RingEventKind
+from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.findings import Severity
 from dissectors.frame import Flaw, Frame
 from dissectors.line import LineSettings, Timing

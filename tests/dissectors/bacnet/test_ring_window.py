@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
-from dissectors.bacnet.ring import RingEventKind, order_of
+from dissectors.bacnet.ring import order_of
+from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.bacnet.ring_window import Happening, MstpRingWindow, RingJournal
 from dissectors.line import Timing
 from sniff.engine.bulk import tables

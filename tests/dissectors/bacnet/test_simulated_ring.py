@@ -7,7 +7,8 @@ from dataclasses import replace
 import pytest
 
 from dissectors.bacnet.findings import judge
-from dissectors.bacnet.ring import Ring, RingEventKind
+from dissectors.bacnet.ring import Ring
+from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.bacnet.ring_observer import MstpRingObserver
 from dissectors.bacnet.simulated import Device, Faults, Poller, SimulatedNode, f510
 from dissectors.findings import Severity

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dissectors.bacnet.ring import RingEventKind
+from dissectors.bacnet.ring_events import RingEventKind
 from tests.dissectors.bacnet.ring_script import Step, data, poll, rounds, script, token
 
 READ = "01040003010c0c020004d2194d"

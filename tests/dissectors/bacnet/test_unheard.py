@@ -8,7 +8,7 @@ import pytest
 
 from dissectors.bacnet.application import read_property
 from dissectors.bacnet.envelope import frame, npdu_frame
-from dissectors.bacnet.ring import RingEventKind
+from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.findings import Severity
 from tests.dissectors.bacnet.ring_script import Read, Step, data, found, poll, rounds, script, token
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dissectors.bacnet.ring import RingEventKind
+from dissectors.bacnet.ring_events import RingEventKind
 from tests.dissectors.bacnet.ring_script import Step, data, found, poll, rounds, script, token
 
 READ = "010400030 10c0c020004d2194d".replace(" ", "")

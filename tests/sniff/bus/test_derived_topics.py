@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from dissectors import registry
-from dissectors.bacnet.ring import RingEventKind
+from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.bacnet.ring_observer import MstpRingObserver
 from dissectors.simulated_faults import LostResponse
 from sniff.analysis.judging import Judging

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from dissectors.bacnet import MSTP
-from dissectors.bacnet.ring import Ring, RingEventKind
+from dissectors.bacnet.ring import Ring
+from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.frame import Chunk, Frame
 from sniff.bus.offline import outputs
 from sniff.cli import main
