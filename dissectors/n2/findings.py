@@ -203,6 +203,7 @@ class N2Findings:
                 self._see_hit(transaction)
                 station.sent.frames += 1  # in pieces
                 station.sent.add_bad(transaction.end, transaction.request)
+                self.torn.struck(station.sent)
             return
         if verdict is Verdict.DAMAGED_ANSWER:
             self._see_hit(transaction)

@@ -99,8 +99,11 @@ class TornFrames:
             self._late_row = first + int(late[-1])
 
     def struck(self, sender: Damages) -> None:
-        """Say who was counted for the row."""
-        self._struck.append(sender)
+        """Say who was counted for the row, or for those before it; where no piece is held, that is settled."""
+        if self._pieces:
+            self._struck.append(sender)
+        else:
+            sender.settle()
 
     def _is_whole_with(self, octets: bytes) -> bool:
         whole = b"".join((*self._pieces, octets))

@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
-from dissectors.frame import Check, Damage, Flaw, FoundBy, Frame, Noise, Place, Reason, Repair
-from dissectors.line import LineSettings, Timing
+from dissectors.frame import Check, Chunk, Damage, Flaw, FoundBy, Frame, Noise, Place, Reason, Repair
+from dissectors.line import MS, LineSettings, Timing
+from dissectors.n2.envelope import make_answer
 from dissectors.n2.record import Damages
 from dissectors.n2.torn import TornFrames
+from tests.dissectors.n2.heard import LINE, findings_of, in_turns
 
 TIMING = Timing(LineSettings.parse("9600,8N1"), 0)
 
@@ -80,3 +82,14 @@ def test_an_answer_torn_to_noise_is_one() -> None:
     torn.see(2, Noise(b"1\r", 0, 1, Place.BEFORE, Reason.NO_DELIMITER), None, is_good_frame=False)
     assert torn.is_answered(0)
     assert not torn.is_answered(1)
+
+
+def test_a_torn_answer_takes_back_no_damage_of_before() -> None:
+    read, answer = b">0111010387\r", make_answer("00420000")
+    good, spoilt, now = (read, answer), (read, bytes(range(0x81, 0x8D))), 0
+    chunks = list(in_turns((good, good, good, spoilt) * 6, 100))
+    for wait, octets in ((100, read), (12, answer[:9]), (600, answer[9:])):
+        now = chunks[-1].time + wait * MS + len(octets) * LINE.char
+        chunks.append(Chunk(now, octets))
+    (told,) = (one for one in findings_of(chunks) if one.code == "N2004")
+    assert (told.about.station, told.count) == (1, 6)
