@@ -10,6 +10,7 @@ from dissectors.line import LineSettings, Timing
 from dissectors.profibus import PROFIBUS
 from dissectors.profibus.findings import ProfibusFindings
 from dissectors.profibus.ring import SlaveCounts
+from dissectors.profibus.slave_state import SlaveState
 from dissectors.profibus.telegram import BROADCAST, SC, telegram
 from sniff.engine.engine import Engine, Output
 
@@ -138,3 +139,12 @@ def test_one_request_and_its_repeats_prove_no_absent_station() -> None:
     again = found(judged([*once, *exchanges(2), *once, *exchanges(2)]), "PB001")
     assert again is not None
     assert again.severity is Severity.ERROR
+
+
+def test_a_slave_is_offline_after_four_requests_that_nothing_answers() -> None:
+    lost = [(1, telegram(5, 1, 0x5D, b"\0"))]
+    for count, state in ((3, SlaveState.EXCHANGE), (4, SlaveState.OFFLINE), (9, SlaveState.OFFLINE)):
+        judge = judged([*exchanges(4), *lost * count, (1, telegram(9, 1, 0x6D, dsap=60, ssap=62))])
+        assert judge.ring().slaves[5].state is state, count
+    back = judged([*exchanges(4), *lost * 4, *exchanges(1)])
+    assert back.ring().slaves[5].state is SlaveState.EXCHANGE
