@@ -203,7 +203,7 @@ class LearnedTiming:
         """The gap below which a frame after an answer is not the master's next request; `silence` while unlearnt."""
         return max(silence, min(self._pauses) // 2) if len(self._pauses) >= 4 else silence
 
-    # ---- for who lets exchanges go by the tracker (seam.py)
+    # ---- for who lets exchanges go by the tracker (exchange_memory.py)
 
     @property
     def waits(self) -> tuple[int, ...]:
