@@ -189,6 +189,10 @@ class OctetWindow:
         """Nominal (latest) end of octet `index`, ns."""
         return self._end_in(self._run(index), index)
 
+    def slack(self, index: int) -> int:
+        """How much sooner than nominally octet `index` may have ended, ns."""
+        return self._run(index).slack
+
     def errors(self, begin: int, end: int) -> LineError:
         """What the UART reported about octets `begin` … `end` - 1 of the window, together."""
         together = LineError(0)

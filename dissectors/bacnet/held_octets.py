@@ -111,8 +111,11 @@ class HeldOctets:
         if size >= HEADER and (damage is not Damage.HEADER):
             expected = total(octets[5] << 8 | octets[6])
         flags: tuple[str, ...] = ()
+        end = slack = None
         if check is Check.GOOD and expected is not None and size > expected:
             flags = ("trailing-pad",)
+            # it comes directly behind: a pad that was read later, or is none, makes the frame no longer
+            end, slack = self._window.end(expected - 1) + self._char, self._window.slack(expected - 1)
         taken = self._take(size)
         skipped, self._skipped = self._skipped, 0
         self._plain = 0
@@ -123,13 +126,13 @@ class HeldOctets:
             "mstp",
             taken.octets,
             taken.start,
-            taken.end,
+            taken.end if end is None else min(end, taken.end),
             check,
             found,
             damage,
             expected,
             skipped,
-            taken.slack,
+            taken.slack if slack is None else slack,
             taken.marks,
             flags,
             repair,

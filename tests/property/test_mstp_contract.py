@@ -131,6 +131,13 @@ def test_the_pad_octet_belongs_to_the_frame_and_a_second_one_does_not():
     assert events[-1].skipped == 1
 
 
+def test_a_pad_that_was_read_later_makes_the_frame_no_longer():
+    held_back = Timing(LineSettings(38400), 17_500_000)
+    events = drive(TOKEN, (15 * MS, b"\xff" + TOKEN), timing=held_back)
+    assert [e.octets for e in events] == [TOKEN + b"\xff", TOKEN]
+    assert events[0].end - events[0].start == 9 * held_back.char
+
+
 def test_an_octet_long_after_the_frame_is_no_pad():
     events = drive(TOKEN, (30 * MS, b"\xff"), (30 * MS, TOKEN))
     assert [type(e) for e in events] == [Frame, Noise, Frame]
