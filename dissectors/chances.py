@@ -21,7 +21,7 @@ def at_least(count: int, of: int, share: float) -> float:
     """
     if count <= 0 or share >= 1:
         return 1.0
-    if share <= 0:
+    if share <= 0 or count > of:
         return 0.0
     if of > _EXACT_MOST:
         return erfc((count - 0.5 - of * share) / sqrt(2 * of * share * (1 - share))) / 2

@@ -32,14 +32,14 @@ def shares_of_damage(seen: BusRecord) -> DamageShare:
     Stations are compared with each other, and the master with all: what strikes all answers is no station's fault.
     """
     frames = {
-        name: one.damaged.count - one.explained - seen.ended_oddly(name)
+        name: max(0, one.damaged.count - one.explained - seen.ended_oddly(name))
         for name, one in ((f"station {unit}", one) for unit, one in seen.stations.items())
     }
     hits = {sender: seen.strikes.of(sender, count) for sender, count in frames.items()}
     octets = {sender: max(1, seen.octets[sender]) for sender in (*hits, "master")}
     miscounted = seen.miscounted_requests
     own = miscounted.count if miscounted is not None else 0
-    frames["master"] = seen.damaged_requests.count - own - seen.ended_oddly("master")
+    frames["master"] = max(0, seen.damaged_requests.count - own - seen.ended_oddly("master"))
     requests = seen.strikes.of("master", frames["master"])
     if len(hits) == 1:
         hits["master"] = requests

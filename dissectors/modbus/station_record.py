@@ -198,7 +198,8 @@ class StationRecord:
         flawed = sum(tally.count for tally in self.flaws.values() if tally.count >= 3)
         miscounted = self.miscounted
         flawed += miscounted.count if miscounted is not None else 0
-        return flawed + (self.garbage.tally.count if self.garbage.is_system else 0)
+        garbage = self.garbage.tally.count if self.garbage.is_system else 0
+        return min(self.damaged.count, flawed + garbage)  # one answer may be explained twice
 
     @property
     def miscounted(self) -> Habit | None:

@@ -37,3 +37,7 @@ def test_the_tail_goes_on_where_it_is_no_longer_summed(share: float) -> None:
         assert at_least(count + 1, 400, share) <= at_least(count, 400, share)
     assert at_least(1, 1000, 0.0) == at_least(1, 10, 0.0) == 0
     assert at_least(1, 10, 1.0) == 1
+
+
+def test_more_than_there_are_do_not_come() -> None:
+    assert at_least(1, -2, 0.2) == at_least(3, 2, 0.5) == at_least(500, 450, 0.5) == 0.0

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import pytest
 
+from dissectors.frame import Flaw
+from dissectors.modbus.station_record import StationRecord
 from tests.dissectors.modbus.judged import findings_of, graves_of
 
 OTHER, OTHER_VALUES = "020300000001", "0203020007"
@@ -201,3 +203,13 @@ def test_a_makers_request_every_few_seconds_that_nobody_answers_stays_unanswered
         bus.say(f"01410603450{value % 2:x}", 6000)
     bus.exchange("020300000002", "020304000700ff")
     assert graves_of(bus) == {("MB001", "station 1")}
+
+
+def test_an_answer_is_explained_once_though_two_ways_explain_it() -> None:
+    record = StationRecord()
+    for no in range(1, 4):
+        record.damaged.add(no, no)
+    for flaw in (Flaw.LAST_MISSING, Flaw.FIRST_SPOILT):
+        for no in range(1, 4):
+            record.flaw(flaw).add(no, no)
+    assert record.explained == record.damaged.count == 3
