@@ -7,6 +7,7 @@ station: it is slow when even the shortest reading is too long, too quick when e
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from dissectors.findings import ExceptionWords, Finding, Tally
 from dissectors.frame import Damage, Flaw, Frame, Role
@@ -15,7 +16,6 @@ from dissectors.modbus.asked import AskedRequest
 from dissectors.modbus.check_mistakes import ways
 from dissectors.modbus.envelope import RTU_NAME
 from dissectors.modbus.exchange import is_begin_of
-from dissectors.modbus.functions import COPIED, EXCEPTION_BIT, FUNCTIONS
 from dissectors.modbus.learned_timing import READ
 from dissectors.modbus.limits import ILLEGAL, beyond_limits
 from dissectors.modbus.pairing import is_answer
@@ -23,6 +23,7 @@ from dissectors.modbus.remembered import FINAL_KEPT, LOST_KEPT, OPEN_KEPT, SLOW_
 from dissectors.modbus.response_groups import AnsweredRequest
 from dissectors.modbus.row_observer import AT_ONCE, STRAY_KEPT, RowObserver
 from dissectors.modbus.rules_bus import judge
+from dissectors.modbus.second_answers import SecondAnswer, owed
 from dissectors.modbus.station_record import Lost, StationRecord
 from dissectors.modbus.wrong_ends import ends_badly, excess_of
 from dissectors.tracker import Transaction, Verdict
@@ -45,6 +46,11 @@ class ModbusFindings(RowObserver):
         answer = self.answers.pop(transaction.id, b"")
         stray, flaw = self.stray.pop(transaction.id, b""), self.flaws.pop(transaction.id, None)
         ended = self.bad_ends.pop(transaction.id, None)
+        if (second := self.seconds.pop(transaction.id, None)) is not None and transaction.verdict is not Verdict.OPEN:
+            if transaction.verdict is Verdict.NO_RESPONSE and asked is not None:
+                transaction, answer = second.in_answer_to(transaction, asked), second.octets
+            else:
+                second.count()
         verdict = transaction.verdict
         if stray and asked is not None and self._came_back_in_pieces(asked, stray, verdict):
             self.seen.cut_echoes.add(transaction.start, asked.no)
@@ -62,7 +68,7 @@ class ModbusFindings(RowObserver):
             if verdict is Verdict.BROADCAST and asked is not None:
                 self.seen.cycles.add(asked.octets, asked.key, transaction.start)
             return
-        if verdict in (Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST) and self._came_late(transaction):
+        if verdict in (Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST) and self.came_late(transaction):
             return  # a frame was torn by a late read, not spoilt
         if self._is_torn(transaction, asked):
             return
@@ -100,12 +106,10 @@ class ModbusFindings(RowObserver):
             self.repeats.append(transaction.id)
         if verdict is Verdict.ANSWERED_TWICE and transaction.of in self.copied:
             self.seen.asked_twice.add(transaction.start, transaction.response)  # what seemed an echo had its answer
-        elif verdict is Verdict.ANSWERED_TWICE and self._may_be_next_request(transaction, answer):
+        elif verdict is Verdict.ANSWERED_TWICE and self.may_be_next_request(transaction, answer):
             station.undecided.add(transaction.start, transaction.request, transaction.response)
         elif verdict is Verdict.ANSWERED_TWICE and transaction.of not in self.repeats:
-            station.twice.add(transaction.start, transaction.response)
-            first = self.final.get(transaction.of or 0)
-            station.same_twice += not answer or first is None or first == answer
+            self._settle_second(station, transaction, answer)
         elif verdict in (Verdict.LATE, Verdict.ANSWERED_TWICE):  # each try has its answer, the first one came late
             self._settle_late(station, transaction)
         elif asked is not None:
@@ -120,23 +124,9 @@ class ModbusFindings(RowObserver):
             if damaged:
                 self._settle_damaged(station, transaction, asked, stray, flaw)
 
-    def _came_late(self, transaction: Transaction) -> bool:
-        """Whether a row of it, or the next one, came in a late read; behind a request noise that came in answer."""
-        request, response = transaction.request or transaction.response or 0, transaction.response or 0
-        is_noise = not response and transaction.verdict is Verdict.DAMAGED_ANSWER
-        return self.late.among(request, max(request, response) + 1 + is_noise)
-
     def _came_back_in_pieces(self, asked: AskedRequest, stray: bytes, verdict: Verdict) -> bool:
         """Whether what came behind a request is its begin, cut short, and was no answer by the times of its pieces."""
         return verdict is not Verdict.DAMAGED_ANSWER and is_begin_of(stray, asked.frame.octets)
-
-    def _may_be_next_request(self, transaction: Transaction, answer: bytes) -> bool:
-        """Whether a second answer may be the master's next request, the same again: it, or the frame before it, was
-        read too late to say how long the master paused."""
-        row = transaction.response
-        if row is None or not self.late.among(row - 1, row) or len(answer) < 2 or answer[1] & EXCEPTION_BIT:
-            return False
-        return answer[1] in COPIED or answer[1] not in FUNCTIONS
 
     def word_exceptions(self, words: ExceptionWords) -> None:
         """See `dissectors.findings.WordsExceptions`."""
@@ -252,7 +242,9 @@ class ModbusFindings(RowObserver):
                 )
             is_waited_for = asked.no in self.waited_for
             station.waited_for += is_waited_for
-            self.lost[transaction.id] = Lost(asked.unit, asked.key, asked.no, is_unheard, is_waited_for)
+            self.lost[transaction.id] = Lost(
+                asked.unit, asked.key, asked.no, asked.frame.end, is_unheard, is_waited_for
+            )
             if len(self.lost) > LOST_KEPT:
                 del self.lost[next(iter(self.lost))]
             return
@@ -262,7 +254,7 @@ class ModbusFindings(RowObserver):
             station.damaged.add(transaction.end, transaction.request, transaction.response)
             station.garbled += transaction.response is None
             return
-        if not asked.header.ok and not self._came_late(transaction) and not self.torn.is_torn(transaction.id):
+        if not asked.header.ok and not self.came_late(transaction) and not self.torn.is_torn(transaction.id):
             self.seen.damaged_here.add(transaction.start, transaction.request)
         self.seen.strikes.whole()
         self.seen.late_speakers.answered(asked.unit, f"station {asked.unit}", transaction.start)
@@ -342,6 +334,20 @@ class ModbusFindings(RowObserver):
             if waited < (_NO_WAIT if timeout is not None and timeout < 2 * AT_ONCE else AT_ONCE):
                 return
         station.late.add(transaction.start, transaction.response)
+
+    def _settle_second(self, station: StationRecord, transaction: Transaction, answer: bytes) -> None:
+        """A second answer, unless it is the late one to a request that the station left; where it comes into the wait
+        for another, what becomes of that decides."""
+        left = owed(self.lost, transaction, self.learnt.timeout)
+        if left is not None:
+            self._settle_late(station, replace(transaction, of=left))
+            return
+        second = SecondAnswer(station, transaction, answer, self.final.get(transaction.of or 0))
+        tx, waiting = self.newest or 0, self.asked.get(self.newest or 0)
+        if waiting is not None and waiting.unit == transaction.station and answer and tx not in self.seconds:
+            self.seconds[tx] = second
+        else:
+            second.count()
 
     def _settle_for_nobody(self, transaction: Transaction, asked: AskedRequest) -> None:
         """A read of address 0, and who answered it."""

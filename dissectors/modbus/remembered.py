@@ -15,6 +15,7 @@ from dissectors.modbus.late_rows import LateRows
 from dissectors.modbus.learned_timing import LearnedTiming
 from dissectors.modbus.long_silences import LongSilences
 from dissectors.modbus.odd_ends import OddEnds
+from dissectors.modbus.second_answers import SecondAnswer
 from dissectors.modbus.station_record import Lost, StationRecord
 from dissectors.modbus.torn import TornFrames
 from dissectors.tracker import Transaction
@@ -94,6 +95,7 @@ class Remembered:
         self.unheard: deque[int] = deque(maxlen=LOST_KEPT)  # requests after which the master went on as after answers
         self.waited_for: deque[int] = deque(maxlen=LOST_KEPT)  # those for which it waited longer than that
         self.hasty: deque[int] = deque(maxlen=LOST_KEPT)  # those after which another came sooner than that
+        self.seconds: dict[int, SecondAnswer] = {}  # that came while another request waited, by its transaction
         self.final: dict[int, bytes] = {}  # the last answers, by transaction
 
     def settle_unfit(self, newest: int) -> None:

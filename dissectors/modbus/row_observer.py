@@ -7,7 +7,7 @@ from dissectors.line import MS
 from dissectors.modbus.asked import AskedRequest
 from dissectors.modbus.cut_echo import CutEcho
 from dissectors.modbus.envelope import readable_adu
-from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT
+from dissectors.modbus.functions import BROADCAST, COPIED, EXCEPTION_BIT, FUNCTIONS
 from dissectors.modbus.long_silences import SILENCE_LEAST
 from dissectors.modbus.remembered import (
     BEGIN,
@@ -17,7 +17,7 @@ from dissectors.modbus.remembered import (
     OPEN_KEPT,
     Remembered,
 )
-from dissectors.tracker import Placement
+from dissectors.tracker import Placement, Transaction, Verdict
 
 TURNAROUND = 90 * MS
 """Nobody speaks so soon after a broadcast: the master waits 100 … 200 ms (Modbus over Serial Line V1.02, 2.4.1)."""
@@ -235,3 +235,17 @@ class RowObserver(Remembered):
         """A good frame: what stands behind it may be its own begin, where it may be a request."""
         within = AT_ONCE if header.role is Role.REQUEST else self.timing.t35
         self.given_back = CutEcho() if placement.role is Role.RESPONSE else CutEcho(frame, within)
+
+    def came_late(self, transaction: Transaction) -> bool:
+        """Whether a row of it, or the next one, came in a late read; behind a request noise that came in answer."""
+        request, response = transaction.request or transaction.response or 0, transaction.response or 0
+        is_noise = not response and transaction.verdict is Verdict.DAMAGED_ANSWER
+        return self.late.among(request, max(request, response) + 1 + is_noise)
+
+    def may_be_next_request(self, transaction: Transaction, answer: bytes) -> bool:
+        """Whether a second answer may be the master's next request, the same again: it, or the frame before it, was
+        read too late to say how long the master paused."""
+        row = transaction.response
+        if row is None or not self.late.among(row - 1, row) or len(answer) < 2 or answer[1] & EXCEPTION_BIT:
+            return False
+        return answer[1] in COPIED or answer[1] not in FUNCTIONS

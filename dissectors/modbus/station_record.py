@@ -139,11 +139,12 @@ class Requested:
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """A request that nothing answered, so far."""
+    """A request that nothing answered, so far. `end`: when it ended, ns."""
 
     unit: int
     key: Key
     no: int
+    end: int
     is_unheard: bool = False
     is_waited_for: bool = False
 

@@ -202,6 +202,21 @@ def test_a_second_answer_with_the_same_octets_may_be_a_converters(bus):
     assert "octet for octet" in finding.seen
 
 
+def test_a_station_that_is_an_answer_behind_is_no_second_one(bus):
+    bus.exchange(READ, VALUES, 30)
+    for _ in range(3):  # what it says to the second request fits the first, and comes sooner than any answer did
+        bus.exchange("010400000001", "0104020007", 30).exchange(READ, "0104020007", 11)
+        quiet(bus)
+    assert graves_of(bus) == {("MB010", "station 1")}
+
+
+def test_what_comes_too_late_and_once_more_is_no_second_station(bus):
+    quiet(bus)
+    for _ in range(4):  # asked three times in all, answered as often
+        bus.say(READ, 300).say(OTHER, 120).say(READ, 120).say(VALUES, 30).say("0103020008", 20)
+    assert "MB201" not in {code for code, _ in graves_of(bus)}
+
+
 def test_a_second_answer_with_other_octets_is_a_second_station(bus):
     for _ in range(4):
         bus.exchange(READ, VALUES).say("0103020008", 5)
