@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import erfc, exp, lgamma, log, log1p, sqrt
 
 _EXACT_MOST = 400
+_NEGLIGIBLE = 1e-12
 
 MINUTE = 60_000_000_000  # ns
 TOLERABLE = 2
@@ -17,19 +18,23 @@ FEW = 100
 def at_least(count: int, of: int, share: float) -> float:
     """How likely `count` or more of `of` fall on who has that share (0 … 1): the upper tail of the binomial.
 
-    Exact up to 400, by the normal law beyond. 1.0 where it is sure.
+    Exact, but for what is no surprise among more than 400, which goes by the normal law: that has too thin a tail
+    where little was to be expected. 1.0 where it is sure.
     """
     if count <= 0 or share >= 1:
         return 1.0
     if share <= 0 or count > of:
         return 0.0
-    if of > _EXACT_MOST:
+    if of > _EXACT_MOST and count <= of * share:
         return erfc((count - 0.5 - of * share) / sqrt(2 * of * share * (1 - share))) / 2
     whole, hit, missed = lgamma(of + 1), log(share), log1p(-share)
-    terms = (
-        exp(whole - lgamma(k + 1) - lgamma(of - k + 1) + k * hit + (of - k) * missed) for k in range(count, of + 1)
-    )
-    return min(1.0, sum(terms))
+    total = 0.0
+    for k in range(count, of + 1):
+        term = exp(whole - lgamma(k + 1) - lgamma(of - k + 1) + k * hit + (of - k) * missed)
+        total += term
+        if k > of * share and term <= total * _NEGLIGIBLE:  # from there on each is less than the one before
+            break
+    return min(1.0, total)
 
 
 def is_rare(count: int, of: int, span: int) -> bool:

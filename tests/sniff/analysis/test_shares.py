@@ -46,6 +46,20 @@ def test_the_chance_of_so_many() -> None:
 
 
 @pytest.mark.parametrize(
+    ("count", "of", "share", "chance"),
+    [(4, 400, 0.00125, 1.75e-3), (4, 1000, 0.0005, 1.75e-3), (9, 1000, 0.002, 2.32e-4), (40, 10**7, 1e-6, 1.2e-12)],
+)
+def test_few_of_very_many_are_no_more_surprising(count: int, of: int, share: float, chance: float) -> None:
+    assert at_least(count, of, share) == pytest.approx(chance, rel=0.1)
+
+
+def test_who_sends_little_is_not_named_for_a_few() -> None:
+    others = {f"station {number}": (50, 100_000.0) for number in range(1, 20)}
+    assert standing_out({**others, "station 20": (4, 1_000.0)}) == set()
+    assert standing_out({**others, "station 20": (9, 1_000.0)}) == {"station 20"}
+
+
+@pytest.mark.parametrize(
     ("count", "of", "span", "rare"),
     [
         (1, 1, 0, True),
