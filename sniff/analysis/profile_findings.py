@@ -43,9 +43,11 @@ Key = tuple[str, Subject, str]
 
 @dataclass(slots=True)
 class _Told:
-    """One finding in the making. `worst`: ns, of the slowest answer. `sure`: whether no layout behind it is a guess."""
+    """One finding in the making. `seen`: the first time; `is_same`: and each time after it. `worst`: ns, of the slowest
+    answer. `sure`: whether no layout behind it is a guess."""
 
     seen: str
+    is_same: bool = True
     tally: Tally = field(default_factory=Tally)
     worst: int = 0
     sure: bool = True
@@ -146,7 +148,7 @@ class ProfileFindings:
             seen = f"{count} of {self._answers.get(subject, 0)} answers {seen}, the slowest at least "
             seen += milliseconds(told.worst)
         elif count > 1:
-            seen = f"{seen}, {count} times"
+            seen = f"{seen}, {count} times" if told.is_same else f"{seen}; that is the first of {count} times"
         if told.sure:
             return told.tally.found(PROFILE_RULES[code], subject, seen)
         seen += ", as far as this is where the state stands in the answer, which no public source confirms"
@@ -311,6 +313,7 @@ class ProfileFindings:
             if len(self._told) >= MOST_TOLD:
                 return None
             told = self._told[key] = _Told(seen, sure=code not in CODES.values())
+        told.is_same = told.is_same and told.seen == seen
         told.tally.add(time, no)
         return told
 
@@ -320,11 +323,17 @@ def _troubles(entry: Entry, value: Value) -> Iterator[str]:
     raw = value.raw or 0
     if entry.bits:
         yield from (bit.on for bit in entry.bits if raw >> bit.number & 1)
-    elif value.value and isinstance(value.value, int | float):
-        code = int(value.value)
+    elif value.value and (code := _whole(value.value)) is not None and in_range(entry, code):
         words = state_words(entry, code) or bit_words(entry, raw)
         unknown = "reserved in the manual" if code in entry.reserved_codes else "not in the manual"
         yield words if entry.high == 1 else f"code {code}, {words or unknown}"
+
+
+def _whole(value: float | str) -> int | None:
+    """A number as the code that it may be; what is no whole number is none."""
+    if isinstance(value, int):
+        return value
+    return int(value) if isinstance(value, float) and value.is_integer() else None
 
 
 def _running_states(entry: Entry, raw: int) -> list[str]:

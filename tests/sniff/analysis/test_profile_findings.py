@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -123,6 +124,25 @@ def test_findings_add_up_and_carry_evidence() -> None:
     assert [(f.code, f.count, f.evidence) for f in found] == [("PR004", 3, (2, 4, 6)), ("PR004", 1, (8,))]
     assert found[0].seen == "fault: code 17, external fault 01, 3 times"
     assert found[0].first < found[0].last
+
+
+def test_what_is_not_the_same_each_time_is_told_of_the_first() -> None:
+    found = judged(*[(f"01062502{value}", f"01062502{value}") for value in ("ffff", "fffe", "ffff")])
+    assert [one.seen for one in found if one.code == "PR001"] == [
+        "frequency command 655.35 Hz written, range 0 … 599 Hz; that is the first of 3 times"
+    ]
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, 1e30, 0.5, 2])
+def test_what_is_no_code_is_no_fault(number: float) -> None:
+    profile = packaged("teco-f510")
+    reading = Reading("binary-input", 2, 0x7FC00000, number, Origin.READ)
+    (value,) = (one for one in decode(profile, [reading]) if not one.bit)
+    judge = ProfileFindings(bus.SESSION.timing, registry.get("mstp"), Devices(default=profile))
+    judge._judge_value(Sample(0, 5, value, 1))
+    assert {one.code for one in judge.findings()} <= {"PR001"}
+    judge._judge_value(Sample(0, 5, replace(value, value=1), 2))
+    assert "PR004" in {one.code for one in judge.findings()}
 
 
 def test_no_profile_no_finding() -> None:
