@@ -228,7 +228,7 @@ class LineFindings:
         self._awaited = 0
 
     def _count_instead(self, count: int, asked: str | None) -> None:
-        if count and asked is not None and len(self._instead) < MOST_SENDERS:
+        if count and asked is not None and (asked in self._instead or len(self._instead) < MOST_SENDERS):
             self._instead[asked] += count
 
     def _take_back_strays(self) -> None:

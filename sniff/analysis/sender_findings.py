@@ -182,8 +182,9 @@ class Senders:
     def _close_packet(self) -> None:
         if self._packet and not self._is_foreign:
             self._flags.add(*self._opened)
-            if len(self._flagged) < MOST_SENDERS:
-                self._flagged[frozenset(self._packet)] += 1
+            senders = frozenset(self._packet)
+            if senders in self._flagged or len(self._flagged) < MOST_SENDERS:
+                self._flagged[senders] += 1
         self._packet = set()
         self._goes_on = self._is_foreign = False
 
@@ -269,7 +270,7 @@ class Senders:
         total = packets.total()
         if total < 2:
             return None
-        words = f"line errors are flagged on {counted(total, 'packet')}"
+        words = f"line errors are flagged on {counted(flags.count, 'packet')}"
         everybody = f"{words}, whoever sends; the frames in them may be good"
         of_bus = flags.found(RULES["LN101"], BUS, everybody, note_if(total, self.frames))
         rates = {name: one.flagged / one.frames for name, one in self.by_name.items() if one.frames >= 3}

@@ -135,6 +135,16 @@ def test_a_station_of_another_format_is_told_so() -> None:
     assert not bus.senders.are_all_struck()
 
 
+def test_packets_are_counted_however_many_kinds_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sniff.analysis.sender_findings.MOST_SENDERS", 3)
+    bus = Bus(packets=True)
+    for _ in range(10):
+        for name in STATIONS:
+            bus.cycle(marked={name: FRAMING})
+    (found,) = [one for one in bus.senders.wrong_octets(lambda _count, _of: None) if "packets" in one.seen]
+    assert "line errors are flagged on 30 packets" in found.seen
+
+
 @pytest.mark.parametrize(("octets", "named"), [([], {"station 2"}), ([b"\xa4\x08\x2c\x94"], set())])
 def test_a_flag_over_octets_that_are_no_frame_is_not_the_frames(octets: list[bytes], named: set[str]) -> None:
     bus = Bus(packets=True)
