@@ -171,7 +171,7 @@ def _by_rate(sample: Sequence[Chunk], line: LineSettings, has_rate: bool) -> Ite
         yield Fit(
             f"wrong baud rate: every level lasts a multiple of {factor} bits, so the bus is that much slower",
             "the bus is slower than the port that received it, whose baud rate nobody said",
-            f"listen at the {factor}th part of that rate, or `detect`",
+            f"listen at 1/{factor} of that rate, or `detect`",
         )
     elif factor:
         about = f"{factor} times slower, about {line.baud // factor} Bd" if factor < 12 else "over 10 times slower"

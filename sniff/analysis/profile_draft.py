@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 
+from dissectors.findings import counted
 from dissectors.profiles.decoding import number, plain_name
 from dissectors.profiles.model import Kind
 from sniff.analysis.register_guess import RegisterGuess
@@ -53,8 +54,9 @@ def told(guess: RegisterGuess) -> str:
     if guess.low == guess.high:
         span = f"always {number(guess.low)}"
     else:
-        span = f"{number(guess.low)} … {number(guess.high)}, {guess.changes} changes, {guess.rate:.3g} a second"
-    return f"{_HOW[guess.sure]}; {_USES[guess.use]}; {span} in {guess.answers} answers"
+        span = f"{number(guess.low)} … {number(guess.high)}, {counted(guess.changes, 'change')}"
+        span += f", {guess.rate:.3g} a second"
+    return f"{_HOW[guess.sure]}; {_USES[guess.use]}; {span} in {counted(guess.answers, 'answer')}"
 
 
 def _register(family: str, guess: RegisterGuess, of_table: bool) -> list[str]:

@@ -63,8 +63,10 @@ class Remains:
             return None
         share = self.octets / of_all
         stretches = counted(self._tally.count, "stretch", "stretches")
+        are = "is" if self.octets == 1 else "are"
+        part = f"{share:.1%}" if share >= 0.0005 else "under 0.1%"
         words, (name, count) = (
-            f"{self.octets} octets in {stretches} are no frame, {share:.1%} of all",
+            f"{counted(self.octets, 'octet')} in {stretches} {are} no frame, {part} of all",
             self._of_one(heard),
         )
         words += f", {count} of them in place of its answers" if count else ""

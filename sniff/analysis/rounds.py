@@ -90,8 +90,8 @@ class Rounds:
         else:
             self._mark()
             known = np.array(sorted(self._by_mark), np.uint64)
-            at = np.minimum(np.searchsorted(known, held[begins]), len(known) - 1)
-            chosen = np.flatnonzero(known[at] == held[begins])
+            at = np.minimum(np.searchsorted(known, held[begins]), max(0, len(known) - 1))
+            chosen = np.flatnonzero(known[at] == held[begins]) if len(known) else np.zeros(0, np.int64)
         for group in chosen.tolist():
             first, times = int(firsts[group]), int(ends[group] - begins[group])
             begin = int(frames.offset[first])

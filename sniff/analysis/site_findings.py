@@ -311,7 +311,7 @@ def _gateway(
 ) -> Finding:
     whole = ours.back[handed] - ours.asked[handed]
     inside = theirs.answered[places] - theirs.start[places]
-    own = whole - inside
+    own = np.maximum(whole - inside, 0)  # as far as the adapters allow what they said
     asked = sorted(set(theirs.station[places].tolist()))
     middle, most = int(np.median(own)), int(own.max())
     share = int(np.median(own) * 100 / max(1, np.median(whole)))

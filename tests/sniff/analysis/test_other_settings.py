@@ -90,6 +90,9 @@ def test_a_slower_bus(factor: int, data: str) -> None:
     told = what_fits(chunks(bursts, gap=200 * MS), LineSettings.parse(listening), 0, "modbus-rtu")
     assert told is not None
     assert f"the bus is {factor} times slower, about 2400 Bd" in told.seen
+    told = what_fits(chunks(bursts, gap=200 * MS), LineSettings.parse(listening), 0, "modbus-rtu", has_rate=False)
+    assert told is not None
+    assert f"1/{factor} of that rate" in told.next
 
 
 def test_a_much_faster_bus() -> None:

@@ -10,6 +10,7 @@ from dissectors.findings import Severity
 from dissectors.frame import Check, Damage, FoundBy, Frame, Noise, Place, Reason
 from dissectors.line import LineSettings
 from sniff.analysis.line_findings import LineFindings
+from sniff.analysis.remains import Remains
 from sniff.engine.engine import Row
 from sniff.engine.session import Session
 
@@ -30,6 +31,22 @@ def test_mostly_needs_a_majority(octets: Sequence[int], said: str) -> None:
         line.see(Row(no, noise, None, None))
     (finding,) = (finding for finding in line.findings() if finding.code == "LN203")
     assert finding.seen == f"stray octets {len(octets)} times in the silence between 0 frames{said}"
+
+
+@pytest.mark.parametrize(
+    ("lengths", "of_all", "said"),
+    [
+        ((1,), 1000, "1 octet in 1 stretch is no frame, 0.1% of all"),
+        ((4, 5), 100_000, "9 octets in 2 stretches are no frame, under 0.1% of all"),
+    ],
+)
+def test_how_much_is_no_frame(lengths: Sequence[int], of_all: int, said: str) -> None:
+    remains = Remains(Session(port="test", line=LineSettings(), protocol="modbus-rtu"))
+    for no, length in enumerate(lengths):
+        remains.add(no, Noise(bytes(length), 0, 0, Place.BETWEEN, Reason.NO_FRAME))
+    found = remains.found(of_all)
+    assert found is not None
+    assert found.seen == said
 
 
 def _hear(line: LineFindings, *, slack: int = 0, damage: Damage | None = None, rounds: int = 30) -> Severity | None:
