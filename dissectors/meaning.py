@@ -182,7 +182,7 @@ class Meaning:
         doubt = " (?)" if entry.doubt or not reading.sure else _beyond(first)
         titled = _titled(first.entry or entry)
         why = (("doubtful", entry.doubt),) if entry.doubt else ()
-        parts, text = (*_parts(entry, bits), *why, *reading.beside), _text(first, raw) + doubt
+        parts, text = (*_parts(first.entry or entry, bits), *why, *reading.beside), _text(first, raw) + doubt
         return Item(reading, where, titled, text, first, parts, brief_title(first.entry or entry))
 
 

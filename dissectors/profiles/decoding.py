@@ -25,6 +25,12 @@ _FLOATS = {Kind.F32: ">f", Kind.F64: ">d"}
 _EXACT = 1e15
 """Below it a float holds every whole number."""
 
+_SINGLE, _DOUBLE = 7, 15
+"""Significant digits that floats of 32 and of 64 bits always have."""
+
+_SMALL, _PLACES = 0.01, 4
+"""So many places of a scaled number are shown; of one below that, three significant digits where it has them."""
+
 _FIRST = {"coil": 0, "discrete": 1, "input": 3, "holding": 4}
 _REGISTERS = ("holding", "input")
 _ASIDE = re.compile(r" \([^()]*\)$")
@@ -171,18 +177,36 @@ def number(value: int | float | str, entry: Entry | None = None, unit: str = "")
     """A value with its unit and the digits that its scale makes."""
     if isinstance(value, str):
         return '"' + "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in value) + '"'
-    scaled = entry is not None and entry.scale != 1 and isinstance(value, float) and math.isfinite(value)
     if entry is not None and entry.hexadecimal and isinstance(value, int):
         return f"{value:04X}h"
-    text = f"{value:.{min(entry.decimals, 4)}f}" if scaled and entry is not None else digits(value)
+    scaled = entry is not None and entry.scale != 1 and isinstance(value, float) and math.isfinite(value)
+    if scaled and entry is not None and entry.kind not in (*_FLOATS, Kind.REAL):
+        text = f"{value:.{_places(value, entry.decimals)}f}"
+    else:
+        text = digits(value, _SINGLE if entry is not None and entry.kind is Kind.F32 else None)
     return f"{text} {unit}".rstrip()
 
 
-def digits(value: int | float) -> str:
-    """A whole number with all its digits, another with as many as a float of 32 bits has."""
+def _places(value: float, made: int) -> int:
+    """How many of the places that a scale has `made` are worth reading."""
+    places = min(made, _PLACES)
+    return max(places, min(made, 2 - math.floor(math.log10(abs(value))))) if 0 < abs(value) < _SMALL else places
+
+
+def digits(value: int | float, significant: int | None = None) -> str:
+    """A whole number with all its digits, another with as many `significant` ones; where nobody says how many, as its
+    float has."""
     if isinstance(value, int) or (value.is_integer() and abs(value) < _EXACT):
         return str(int(value))
-    return f"{value:.7g}"
+    return f"{value:.{significant or (_SINGLE if _is_single(value) else _DOUBLE)}g}"
+
+
+def _is_single(value: float) -> bool:
+    """Whether a float of 32 bits holds it."""
+    try:
+        return bool(struct.unpack(">f", struct.pack(">f", value))[0] == value)
+    except OverflowError:
+        return False
 
 
 def plain_name(space: str, address: int) -> str:
@@ -310,7 +334,13 @@ def in_range(entry: Entry, value: int | float | str) -> bool:
     """Whether the profile allows a value; one that it says nothing of is allowed."""
     if isinstance(value, str):
         return True
-    return not ((entry.low is not None and value < entry.low) or (entry.high is not None and value > entry.high))
+    below = entry.low is not None and value < entry.low and not _is_limit(entry, value, entry.low)
+    return not (below or (entry.high is not None and value > entry.high and not _is_limit(entry, value, entry.high)))
+
+
+def _is_limit(entry: Entry, value: int | float, limit: float) -> bool:
+    """Whether a float of 32 bits is a limit as near as it can be: 0.1 is 0.100000001 there."""
+    return entry.kind in (Kind.F32, Kind.REAL) and math.isclose(value, limit, rel_tol=2**-23)
 
 
 def bare_range(entry: Entry) -> str:

@@ -144,19 +144,29 @@ class Entry:
 
     @property
     def decimals(self) -> int:
-        """Digits after the point that the scale makes."""
-        text = f"{self.scale:.11f}".rstrip("0")
-        return len(text.partition(".")[2])
+        """Digits after the point that scale and offset make."""
+        texts = (f"{part:.11f}".rstrip("0") for part in (self.scale, self.offset))
+        return max(len(text.partition(".")[2]) for text in texts)
 
     def reserved_in(self, raw: int) -> tuple[int, ...]:
         """The reserved bits that are 1."""
         return tuple(bit for bit in self.reserved_bits if raw >> bit & 1)
 
+    def held(self, raw: int, address: int) -> int:
+        """The bits of the register at `address`, one of those that make this value, at their place in the value."""
+        word = raw >> 8 & 0xFF | (raw & 0xFF) << 8 if self.little else raw
+        return word << self._below(address)
+
+    def _below(self, address: int) -> int:
+        """How many bits of the value are less than those of the register at `address`."""
+        at = address - self.address
+        return 16 * (at if self.swapped else self.kind.registers - 1 - at)
+
     def word_of(self, address: int) -> Entry:
         """The register at `address`, one of the several that make this value, by itself: its high or low word, or
-        with four of them words 1 (the highest) … 4."""
-        count, at = self.kind.registers, address - self.address
-        place = count - 1 - at if self.swapped else at
+        with four of them words 1 (the highest) … 4. It has the bits that stand in it; a code it is none."""
+        count, below = self.kind.registers, self._below(address)
+        place = count - 1 - below // 16
         word = ("high", "low")[place] if count == 2 else f"{place + 1}"
         return replace(
             self,
@@ -169,6 +179,17 @@ class Entry:
             unit="",
             low=None,
             high=None,
+            role=self.role if self.bits else EntryRole.VALUE,
+            states={},
+            states_from="",
+            reserved_codes=frozenset(),
+            reserved_bits=tuple(bit - below for bit in self.reserved_bits if 0 <= bit - below < 16),
+            bits=tuple(replace(bit, number=bit.number - below) for bit in self.bits if 0 <= bit.number - below < 16),
+            parts=tuple(
+                replace(part, low=part.low - below, high=part.high - below)
+                for part in self.parts
+                if part.low - below >= 0 and part.high - below < 16
+            ),
         )
 
 

@@ -207,7 +207,7 @@ class ProfileFindings:
             elif entry is not None and not entry.access.writable:
                 seen = f"{entry.title} ({entry.number}) written, it is read only"
                 self._add("PR003", who, entry.name, seen, frame.end, no)
-            elif entry is not None and reading.raw is not None and (bits := entry.reserved_in(reading.raw)):
+            elif entry is not None and (bits := _reserved_bits(entry, reading)):
                 words = " ".join(f"{bit:X}" for bit in bits)
                 seen = f"{entry.title} ({entry.number}) written with reserved bits {words} set"
                 self._add("PR008", who, f"{entry.name} {words}", seen, frame.end, no)
@@ -316,6 +316,11 @@ class ProfileFindings:
         told.is_same = told.is_same and told.seen == seen
         told.tally.add(time, no)
         return told
+
+
+def _reserved_bits(entry: Entry, reading: Reading) -> tuple[int, ...]:
+    """The reserved bits that a write sets, as the whole value counts them."""
+    return () if reading.raw is None else entry.reserved_in(entry.held(reading.raw, reading.address))
 
 
 def _troubles(entry: Entry, value: Value) -> Iterator[str]:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 import struct
+from typing import Any
 
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from dissectors.meaning import Meaning
 from dissectors.profiles import Devices
 from dissectors.profiles.decoding import Quality, bare_range, decode, plain_name, range_words, say
 from dissectors.profiles.packaged import packaged, parse_text
-from dissectors.readings import Origin, Reading
+from dissectors.readings import Origin, Reading, plain_place
 
 E510 = packaged("teco-e510")
 F510 = packaged("teco-f510")
@@ -73,6 +75,56 @@ def test_half_of_a_long_value_is_said_to_be_half() -> None:
         "a",
         "holding/40011",
     ]
+
+
+def test_half_of_a_long_value_has_the_bits_that_stand_in_it_and_no_code() -> None:
+    text = """
+[[modbus.register]]
+address = 0
+name = "fault"
+title = "fault"
+type = "u32"
+role = "fault"
+states = { 0 = "no fault", 17 = "dry run" }
+[[modbus.register]]
+address = 2
+name = "status"
+type = "u32"
+reserved-bits = "4 20"
+bits = { 0 = ["run", "run", "stop"], 16 = ["hot", "overheated"] }
+part = [{ name = "step", bits = [24, 27], states = { 3 = "third" } }, { name = "both", bits = [15, 17] }]
+"""
+    profile: Any = device(f'[modbus]\nword-order = "high-first"\n{text}')
+    assert [say(profile, holding(at, 0)) for at in (0, 1)] == ["fault, high word 0", "fault, low word 0"]
+    assert say(profile, holding(2, 0x0311)) == "status, high word overheated, third, reserved bit 4"
+    assert say(profile, holding(3, 0x0011)) == "status, low word run, reserved bit 4"
+    names = [value.name for value in decode(profile, holding(2, 1))]
+    assert names == ["status.high", "status.high.hot", "status.high.step"]
+    entry = profile.at("holding", 2)
+    assert [entry.reserved_in(entry.held(0x10, at)) for at in (2, 3)] == [(20,), (4,)]
+    swapped = device(f'[modbus]\nword-order = "low-first"\noctet-order = "low-first"\n{text}').at("holding", 2)  # type: ignore[attr-defined]
+    assert [swapped.reserved_in(swapped.held(0x1000, at)) for at in (2, 3)] == [(4,), (20,)]
+    (item,) = Meaning(3, profile, holding(2, 1)).items(plain_place)
+    assert item.parts == (("bit 0 hot", "1 (overheated)"), ("bits B-8 step", "0"))
+
+
+@pytest.mark.parametrize(
+    ("text", "form", "value", "said"),
+    [
+        ('type = "f32"\nunit = "bar"\nrange = [-0.1, 0.1]', ">f", 0.1, "a 0.1 bar"),
+        ('type = "f32"\nunit = "bar"\nrange = [-0.1, 0.1]', ">f", 0.1001, "a 0.1001 bar (out of range)"),
+        ('type = "f32"\nscale = 100\nunit = "kPa"', ">f", 1.2345, "a 123.45 kPa"),
+        ('type = "f64"\nunit = "kWh"', ">d", 123456789.25, "a 123456789.25 kWh"),
+        ('scale = 0.000001\nunit = "m³/h"', ">H", 37, "a 0.000037 m³/h"),
+        ('scale = 0.000001\nunit = "m³/h"', ">H", 0, "a 0.0000 m³/h"),
+        ('scale = 0.00390625\nunit = "V"', ">H", 25, "a 0.0977 V"),
+        ('scale = 0.1\noffset = -273.15\nunit = "°C"', ">H", 2982, "a 25.05 °C"),
+    ],
+)
+def test_a_number_keeps_the_digits_that_it_has(text: str, form: str, value: float, said: str) -> None:
+    profile: Any = device(f'[[modbus.register]]\naddress = 0\nname = "a"\n{text}')
+    octets = struct.pack(form, value)
+    assert say(profile, holding(0, *struct.unpack(f">{len(octets) // 2}H", octets))) == said
 
 
 def test_values_out_of_range_are_bad_and_doubtful_ones_uncertain() -> None:
