@@ -75,6 +75,7 @@ class NewsDesk:
         if over:
             return None if was_over else NewsKind.GONE
         if was_over:
+            known.severity = finding.severity
             return NewsKind.NEW
         worse, known.severity = finding.severity > known.severity, max(known.severity, finding.severity)
         return NewsKind.WORSE if worse else None

@@ -96,10 +96,19 @@ class StreamOutlet(Outlet):
         if not stat.S_ISREG(os.fstat(self._descriptor).st_mode):
             self._size = 0
             return
-        os.close(self._descriptor)
-        os.replace(self._path, f"{self._path}.1")
-        self._descriptor = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
-        self._size = 0
+        if self._is_there():
+            os.replace(self._path, f"{self._path}.1")
+        descriptor = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+        os.close(self._descriptor)  # not before: its number may be another file's at once
+        self._descriptor = descriptor
+        self._size = os.fstat(descriptor).st_size
+
+    def _is_there(self) -> bool:
+        """Whether the file is still the one of that name, and nobody has moved it away."""
+        try:
+            return os.path.samestat(os.stat(self._path), os.fstat(self._descriptor))
+        except FileNotFoundError:
+            return False
 
     def _discard(self) -> None:
         """Nobody reads any more: what is told from now on is counted."""

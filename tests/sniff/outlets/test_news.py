@@ -24,6 +24,21 @@ def test_new_then_silence_then_worse_then_gone_then_new_again() -> None:
     assert [one.what for one in desk.look([again], later + 3 * S)] == [NewsKind.NEW]
 
 
+def test_what_comes_back_and_becomes_as_grave_as_it_was_is_worse() -> None:
+    desk = NewsDesk(Severity.WARNING, 0)
+    grave = replace(FOUND, severity=Severity.ERROR)
+    later = 10 * S + OVER_AFTER + 1
+    again = replace(FOUND, last=later)
+    looks = [
+        (grave, 11 * S),
+        (grave, later),
+        (again, later + S),
+        (replace(again, severity=Severity.ERROR), later + 2 * S),
+    ]
+    told = [[one.what for one in desk.look([found], now)] for found, now in looks]
+    assert told == [[NewsKind.NEW], [NewsKind.GONE], [NewsKind.NEW], [NewsKind.WORSE]]
+
+
 def test_notes_and_consequences_are_nobodys_business() -> None:
     desk = NewsDesk(Severity.WARNING, 0)
     assert desk.look([replace(FOUND, severity=Severity.NOTE)], 11 * S) == []

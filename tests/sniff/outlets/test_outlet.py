@@ -98,6 +98,35 @@ def test_a_file_is_bounded(tmp_path: Path) -> None:
     assert json.loads(path.read_text().splitlines()[-1])["value"] == 3.0
 
 
+@pytest.mark.parametrize("anew", [False, True])
+def test_a_full_file_that_somebody_moved_away_is_begun_anew(tmp_path: Path, anew: bool) -> None:
+    path, moved = tmp_path / "values.jsonl", tmp_path / "values.jsonl.1"
+    outlet = lines_into(str(path), most_size=4000)
+    outlet._write(["x" * 3000])
+    path.rename(moved)
+    if anew:
+        path.touch()
+    assert outlet._write(["y" * 3000])
+    assert outlet.trouble == ""
+    assert moved.read_text() == "x" * 3000 + "\n"
+    assert path.read_text() == "y" * 3000 + "\n"
+    os.close(outlet._descriptor)
+
+
+def test_a_file_that_cannot_be_begun_anew_is_no_other_file(tmp_path: Path) -> None:
+    path = tmp_path / "values.jsonl"
+    outlet = lines_into(str(path), most_size=4000)
+    outlet._write(["x" * 3000])
+    (tmp_path / "values.jsonl.1").mkdir()
+    assert outlet._write(["y" * 3000])
+    assert "Is a directory" in outlet.trouble
+    other = os.open(tmp_path / "other", os.O_WRONLY | os.O_CREAT)
+    outlet._write(["z" * 3000])
+    os.close(other)
+    assert (tmp_path / "other").read_text() == ""
+    os.close(outlet._descriptor)
+
+
 def test_a_pipe_that_nobody_reads_holds_nobody_up(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
