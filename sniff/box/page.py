@@ -142,9 +142,11 @@ def _remove_left_behind(path: Path) -> None:
         return
     try:
         status = ask(path)
-    except OSError:
+    except (ConnectionRefusedError, FileNotFoundError):  # nobody listens
         path.unlink(missing_ok=True)
         return
+    except OSError as error:  # somebody does, who is too busy to tell, or hangs
+        raise RunsAlready(f"{path}: a box of this name runs already, and did not say how it is ({error})") from error
     raise RunsAlready(f"box {status.name} runs already: process {status.pid}")
 
 

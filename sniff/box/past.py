@@ -114,10 +114,11 @@ class CapturePid:
 
     def end(self, pid: int) -> str:
         """End it with its files closed, by force if need be; how, in words."""
+        begun = _begun(pid)
         with contextlib.suppress(OSError):
             os.kill(pid, signal.SIGTERM)
         until = time.monotonic() + PATIENCE
-        while _begun(pid):
+        while begun and _begun(pid) == begun:
             if time.monotonic() > until:
                 with contextlib.suppress(OSError):
                     os.kill(pid, signal.SIGKILL)

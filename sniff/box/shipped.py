@@ -23,7 +23,15 @@ def rules() -> str:
 def own_command() -> str:
     """How this very program is started, as a unit must say it: an absolute path."""
     script = Path(sys.executable).with_name("sniff485")
-    return str(script) if script.exists() else f"{sys.executable} -m sniff"
+    return _word(script) if script.exists() else f"{_word(Path(sys.executable))} -m sniff"
+
+
+def _word(path: Path) -> str:
+    """A path as a unit must write it: quoted where it has spaces in it, and its % is no specifier."""
+    text = str(path).replace("%", "%%")
+    if not any(one.isspace() or one in "\"'\\" for one in text):
+        return text
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 def _text(name: str) -> str:

@@ -46,6 +46,17 @@ def test_a_second_box_of_the_name_is_refused_and_one_that_is_gone_is_not(tmp_pat
         assert ask(path) == STATUS
 
 
+def test_a_box_that_does_not_say_how_it_is_keeps_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "site.sock"
+    monkeypatch.setattr("sniff.box.page.PATIENCE", 0.05)
+    with closing(socket.socket(socket.AF_UNIX)) as hung:
+        hung.bind(str(path))
+        hung.listen()
+        with pytest.raises(RunsAlready, match="did not say how it is"):
+            StatusPage(path)
+        assert path.exists()
+
+
 def said(path: Path, words: bytes) -> bytes:
     with closing(socket.socket(socket.AF_UNIX)) as reader:
         reader.settimeout(30)

@@ -87,7 +87,9 @@ def test_other_files_stay(tmp_path: Path, parts: list[Path]) -> None:
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
-def test_a_capture_left_behind_is_known_by_more_than_its_number(tmp_path: Path) -> None:
+def test_a_capture_left_behind_is_known_by_more_than_its_number(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     remembered = past.CapturePid(tmp_path / "site.capture")
     assert remembered.left_behind() is None
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
@@ -98,6 +100,11 @@ def test_a_capture_left_behind_is_known_by_more_than_its_number(tmp_path: Path) 
         remembered.remember(process.pid)
         assert "is closed now" in remembered.end(process.pid)
     assert not (tmp_path / "site.capture").exists()
+    begins = iter((7, 8, 8, 8))  # its number is another one's at once, who is left alone
+    monkeypatch.setattr(past, "_begun", lambda pid: next(begins))
+    monkeypatch.setattr(os, "kill", lambda pid, number: None)
+    assert "is closed now" in remembered.end(4711)
+    monkeypatch.undo()
     (tmp_path / "site.capture").write_text("nonsense")
     assert remembered.left_behind() is None
 
@@ -111,6 +118,17 @@ def test_keep_counts_the_parts_of_earlier_runs(tmp_path: Path) -> None:
     left = sorted(tmp_path.glob("site-*.mcap"))
     assert len(left) <= 3
     assert left[-1] == part_name(tmp_path / "site.mcap", 6)
+
+
+@pytest.mark.parametrize(("folder", "said"), [("my tools", '"{}"'), ("tools", "{}"), ("100%", "{}")])
+def test_a_path_in_the_unit_is_one_word(
+    tmp_path: Path, folder: str, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = tmp_path / folder / "sniff485"
+    program.parent.mkdir()
+    program.touch()
+    monkeypatch.setattr(sys, "executable", str(program.with_name("python")))
+    assert f"ExecStart={said.format(program).replace('%', '%%')} box\n" in shipped.unit()
 
 
 def test_what_is_shipped(tmp_path: Path) -> None:
