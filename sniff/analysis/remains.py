@@ -14,6 +14,7 @@ from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, other_protocol
 from sniff.analysis.sender_findings import BUS
 from sniff.analysis.slower_bus import slower_by
 from sniff.analysis.stray_findings import INSTEAD, INSTEAD_LEAST
+from sniff.analysis.wording import percent
 from sniff.engine.session import Session
 
 MOST_KEPT: Final = 16
@@ -64,9 +65,8 @@ class Remains:
         share = self.octets / of_all
         stretches = counted(self._tally.count, "stretch", "stretches")
         are = "is" if self.octets == 1 else "are"
-        part = f"{share:.1%}" if share >= 0.0005 else "under 0.1%"
         words, (name, count) = (
-            f"{counted(self.octets, 'octet')} in {stretches} {are} no frame, {part} of all",
+            f"{counted(self.octets, 'octet')} in {stretches} {are} no frame, {percent(share)} of all",
             self._of_one(heard),
         )
         words += f", {count} of them in place of its answers" if count else ""

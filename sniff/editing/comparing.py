@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from dissectors.findings import Finding, Severity
+from dissectors.findings import Finding, Severity, counted
 from dissectors.profiles.decoding import number
 from dissectors.tracker import Verdict
 from dissectors.words import milliseconds
@@ -13,6 +13,7 @@ from sniff.analysis.nodes import Node
 from sniff.analysis.point_reader import ALL
 from sniff.analysis.points import Point
 from sniff.analysis.summary import Summary
+from sniff.analysis.wording import percent
 
 NOTICEABLE = 0.02
 """A share has changed when it moved by as much; a time when it moved by a tenth and more than the adapters allow."""
@@ -80,14 +81,14 @@ def _bus(before: Side, after: Side) -> Iterator[Difference]:
     )  # fmt: skip
     for what, old, new in shares:
         if abs(old - new) >= NOTICEABLE or (old == 0) != (new == 0):
-            yield Difference("bus", what, f"{old:.1%}", f"{new:.1%}")
+            yield Difference("bus", what, percent(old), percent(new))
 
 
 def _node(subject: str, old: Node, new: Node, doubt: int) -> Iterator[Difference]:
     for verdict in COMPARED_VERDICTS:
         was, now = _share(old.verdicts[verdict], old.asked), _share(new.verdicts[verdict], new.asked)
         if abs(was - now) >= NOTICEABLE or (was == 0) != (now == 0):
-            yield Difference(subject, verdict.words, f"{was:.1%} of {old.asked}", f"{now:.1%} of {new.asked}")
+            yield Difference(subject, verdict.words, f"{percent(was)} of {old.asked}", f"{percent(now)} of {new.asked}")
     for name, share in (("response p50", 0.5), ("response p95", 0.95)):
         was_time, now_time = old.latency.quantile(share), new.latency.quantile(share)
         if was_time is None or now_time is None:
@@ -149,7 +150,9 @@ def _findings(before: Side, after: Side) -> Iterator[Difference]:
 
 
 def _presence(node: Node | None) -> str:
-    return "absent" if node is None else f"{node.sent} frames from it, {node.asked} requests to it"
+    return (
+        "absent" if node is None else f"{counted(node.sent, 'frame')} from it, {counted(node.asked, 'request')} to it"
+    )
 
 
 def _share(part: int, whole: int) -> float:
