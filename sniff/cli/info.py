@@ -135,10 +135,10 @@ def _kept(capture: Capture, session: Session) -> bool | None:
 
 def _response_times(summary: Summary) -> dict[str, float | None]:
     times = {
-        "least": summary.latency.least,
+        "min": summary.latency.least,
         "p50": summary.latency.quantile(0.5),
         "p95": summary.latency.quantile(0.95),
-        "most": summary.latency.most,
+        "max": summary.latency.most,
     }
     return {name: None if time is None else time / MS for name, time in times.items()}
 

@@ -19,7 +19,7 @@ from sniff.engine.read_source import ReadSource
 from sniff.engine.session import Session
 
 HEADINGS = (
-    "from",
+    "src",
     "station",
     "request",
     "asks",
@@ -36,7 +36,7 @@ HEADINGS = (
     "last",
     "changed",
 )
-_SELDOM = ("from", "exceptions", "late", "damaged", "repeats", "changed")
+_SELDOM = ("src", "exceptions", "late", "damaged", "repeats", "changed")
 """Columns that a person need not see when there is nothing in them."""
 
 

@@ -28,7 +28,7 @@ def run(args: argparse.Namespace) -> int:
                 "adapter": adapter.name,
                 "driver": adapter.driver or None,
                 "serial_number": adapter.serial_number or None,
-                "latency_ms": adapter.latency / MS,
+                "adapter_latency_ms": adapter.latency / MS,
                 "latency_from": adapter.latency_from,
                 "reports": None if adapter.reports is None else list(adapter.reports),
                 "detail": adapter.detail,

@@ -89,13 +89,19 @@ def _list(args: argparse.Namespace) -> int:
         (
             listed.name,
             listed.profile.title if listed.profile is not None else f"BROKEN: {listed.error}",
-            " ".join(listed.profile.protocols) if listed.profile is not None else "",
+            list(listed.profile.protocols) if listed.profile is not None else [],
             len(listed.profile.entries) if listed.profile is not None else 0,
             listed.origin,
         )
         for listed in available()
     ]
-    tables.write(("name", "device", "protocols", "entries", "from"), rows, "json" if args.json else "text")
+    if args.json:
+        for name, device, protocols, entries, origin in rows:
+            told = {"name": name, "device": device, "protocols": protocols, "entries": entries, "origin": origin}
+            print(json_output.dumps(told))
+        return 0
+    shown = [(name, device, " ".join(protocols), entries, origin) for name, device, protocols, entries, origin in rows]
+    tables.write(("name", "device", "protocols", "entries", "from"), shown)
     return 0
 
 
@@ -262,10 +268,10 @@ def _guess(args: argparse.Namespace) -> int:
         guessing = Guessing(dissector_for(session))
         survey(Watched(capture), session, guessing, reference=args.reference)
         guesses = list(guessing.guesses(profiles))
-        rows += [(guess.station, guess.profile.name, f"{guess.score:.0%}", guess.why) for guess in guesses]
+        rows += [(guess.station, guess.profile.name, round(100 * guess.score), guess.why) for guess in guesses]
         _say_ties(guesses)
         say_incomplete(path, capture)
-    tables.write(("station", "profile", "fits", "why"), rows, "json" if args.json else "text")
+    tables.write(("station", "profile", "fits %", "why"), rows, "json" if args.json else "text")
     return 0
 
 

@@ -39,8 +39,8 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def to_json(rule: Rule) -> dict[str, str]:
-    """A rule as a flat object."""
+def to_json(rule: Rule) -> dict[str, str | list[str]]:
+    """A rule as an object."""
     return {
         "code": rule.code,
         "severity": rule.severity.label,
@@ -48,8 +48,8 @@ def to_json(rule: Rule) -> dict[str, str]:
         "explanation": rule.explanation,
         "means": rule.means,
         "next": rule.next,
-        "explains": " ".join(rule.explains),
-        "told_by": " ".join(rule.told_by),
+        "explains": list(rule.explains),
+        "told_by": list(rule.told_by),
     }
 
 

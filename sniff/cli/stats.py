@@ -202,8 +202,8 @@ def _show_ring(model: BusModel, table: str, style: str) -> None:
 
 NODE_HEADINGS = (
     "address",
-    "frames from",
-    "frames to",
+    "sent",
+    "received",
     "asked",
     "answered",
     "exceptions",
@@ -217,7 +217,7 @@ NODE_HEADINGS = (
 )
 HEALTH_HEADINGS = ("subject", "health", "why")
 LATENCY_HEADINGS = ("address", "answers", "least ms", "p50 ms", "p95 ms", "max ms", "± ms")
-LOAD_HEADINGS = ("from", "heard s", "load %", "frames", "damaged", "noise octets", "octets")
+LOAD_HEADINGS = ("time", "heard s", "load %", "frames", "damaged", "noise octets", "octets")
 
 
 class _Kinds:

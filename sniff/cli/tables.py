@@ -1,8 +1,12 @@
-"""Tables as text, CSV or JSON Lines. A cell is text or a number; units stand in the heading."""
+"""Tables as text, CSV or JSON Lines. A cell is text or a number; units stand in the heading.
+
+People read headings, programs names: `p50 ms` is `p50_ms` in CSV and JSON (`name_of`).
+"""
 
 from __future__ import annotations
 
 import csv
+import re
 import sys
 from collections.abc import Iterable, Sequence
 from typing import cast
@@ -17,8 +21,8 @@ Cell = str | int | float | None
 def write(
     headings: Sequence[str], rows: Iterable[Sequence[Cell]], style: str = "text", bold: Sequence[bool] = ()
 ) -> None:
-    """Print a table. `style`: "text" (aligned), "csv", "json" (one object a row, headings as keys). `bold`: rows that
-    stand out, for a terminal that can show it."""
+    """Print a table. `style`: "text" (aligned), "csv", "json" (one object a row); both with names for headings. `bold`:
+    rows that stand out, for a terminal that can show it."""
     if style == "text":
         _write_text(headings, [[_shown(cell) for cell in row] for row in rows], bold)
     else:
@@ -29,10 +33,10 @@ class Growing:
     """A table that is printed as its rows come, as "csv" or "json"."""
 
     def __init__(self, headings: Sequence[str], style: str) -> None:
-        self._headings = headings
+        self._names = [name_of(heading) for heading in headings]
         self._writer = csv.writer(sys.stdout, lineterminator="\n") if style == "csv" else None
         if self._writer is not None:
-            self._writer.writerow(headings)
+            self._writer.writerow(self._names)
 
     def add(self, rows: Iterable[Sequence[Cell]]) -> None:
         """Print more of it."""
@@ -40,7 +44,25 @@ class Growing:
             self._writer.writerows([[safe_cell(cell) for cell in row] for row in rows])
             return
         for row in rows:
-            print(json_output.dumps(dict(zip(self._headings, row, strict=True))))
+            print(json_output.dumps(dict(zip(self._names, row, strict=True))))
+
+
+_COLUMNS = {
+    "MAC": "address",
+    "master": "address",
+    "slave": "address",
+    "no answer": "unanswered",
+    "least ms": "min_ms",
+    "a second": "per_second",
+}
+_SIGNS = {"±": "plus_minus", "%": "percent", "/": " per "}
+
+
+def name_of(heading: str) -> str:
+    """What CSV and JSON call a column: small letters, digits and _, and the same for the same in every table."""
+    for sign, word in _SIGNS.items():
+        heading = heading.replace(sign, word)
+    return _COLUMNS.get(heading) or re.sub(r"\W+", "_", heading.lower()).strip("_")
 
 
 def safe_cell(cell: Cell) -> Cell:

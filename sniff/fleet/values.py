@@ -98,7 +98,7 @@ def _bus(bus: Bus) -> dict[str, Any]:
         "no_capture_since": bus.stopped,
         "missing_days": list(bus.missing),
         "notes": list(bus.notes),
-        "adapter_ms": _ms(bus.latency),
+        "adapter_latency_ms": _ms(bus.latency),
     }
 
 
@@ -122,8 +122,8 @@ def _day(day: Day) -> dict[str, Any]:
         "load": None if day.load is None else round(day.load, 4),
         "frames": day.frames,
         "octets": day.octets,
-        "damaged": round(day.damaged, 6),
-        "unanswered": round(day.unanswered, 6),
+        "damaged_share": round(day.damaged, 6),
+        "unanswered_share": round(day.unanswered, 6),
         "response_p50_ms": p50,
         "response_p95_ms": p95,
         "response_max_ms": most,

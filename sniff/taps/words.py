@@ -99,10 +99,10 @@ KEYS = (
     "missing_at_b",
     "changed_at_a",
     "changed_at_b",
-    "delay_ms_least",
-    "delay_ms_median",
-    "delay_ms_95",
-    "delay_ms_most",
+    "delay_min_ms",
+    "delay_p50_ms",
+    "delay_p95_ms",
+    "delay_max_ms",
 )
 """Of the table of senders: for people, and for programs."""
 

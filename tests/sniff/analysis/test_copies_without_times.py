@@ -78,7 +78,7 @@ def test_a_log_without_times_says_nothing_of_time(tmp_path: Path, capsys: pytest
         assert "bus load" not in told
         assert "times        none: the file does not say when anything came" in told
         assert main(["stats", str(path), "polls", "--json", *reference]) == 0
-        assert all(one["every ms"] is None for one in map(json.loads, capsys.readouterr().out.splitlines()))
+        assert all(one["every_ms"] is None for one in map(json.loads, capsys.readouterr().out.splitlines()))
 
 
 def test_a_ring_without_times_has_no_rounds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -44,7 +44,7 @@ def _objects(ran: Ran) -> list[dict[str, Any]]:
 
 def test_an_answer_that_came_late_is_neither_in_time_nor_none(late: Path, sniff485: Callable[..., Ran]) -> None:
     one = _objects(sniff485("stats", late, "nodes", "--json"))[0]
-    counts = [one[name] for name in ("asked", "answered", "exceptions", "no answer", "late")]
+    counts = [one[name] for name in ("asked", "answered", "exceptions", "unanswered", "late")]
     assert counts == [POLLS, POLLS - POLLS // FIFTH, 0, 0, POLLS // FIFTH]
 
 
@@ -56,9 +56,9 @@ def test_nodes_polls_and_report_count_alike(name: str, late: Path, sniff485: Cal
     (report,) = _objects(sniff485("report", path, "--json"))
     told = {one["address"]: one for one in report["stations"]}
     for node in nodes:
-        counts = [node[name] for name in ("answered", "exceptions", "no answer")]
+        counts = [node[name] for name in ("answered", "exceptions", "unanswered")]
         mine = [poll for poll in polls if poll["station"] == node["address"]]
-        assert [sum(poll[name] for poll in mine) for name in ("answered", "exceptions", "no answer")] == counts
+        assert [sum(poll[name] for poll in mine) for name in ("answered", "exceptions", "unanswered")] == counts
         station = told[node["address"]]
         assert [station[name] for name in ("answered", "exceptions", "unanswered")] == counts
 
@@ -68,7 +68,7 @@ def test_who_answers_polls_with_damaged_frames_alone_is_a_station(sniff485: Call
     path = CAPTURES / "findings" / "ms-tp-last-two-octets-missing.cap.txt"
     assert "MAC 31" in {one["subject"] for one in _objects(sniff485("check", path, "--json", "--fail-on", "never"))}
     (node,) = [one for one in _objects(sniff485("stats", path, "nodes", "--json")) if one["address"] == 31]
-    assert (node["frames from"], node["damaged"]) == (5, 5)
+    assert (node["sent"], node["damaged"]) == (5, 5)
     for how in ((), ("--reference",)):
         (info,) = _objects(sniff485("info", path, "--json", *how))
         assert 31 in {one["address"] for one in info["nodes"]}

@@ -117,3 +117,10 @@ def test_broadcasts_are_no_stations_that_were_polled_for(sniff485: Callable, pol
     assert "broadcasts   1 to 0" in shown
     assert "polled only" not in shown
     assert json.loads(sniff485("info", poll, "--json").out)["polled_only"] == []
+
+
+def test_lists_are_lists(sniff485: Callable) -> None:
+    (rule,) = [json.loads(line) for line in sniff485("rule", "MB001", "--json").out.splitlines()]
+    assert (rule["explains"], rule["told_by"]) == (["MB105", "MB104"], [])
+    profiles = [json.loads(line) for line in sniff485("profile", "list", "--json").out.splitlines()]
+    assert next(one for one in profiles if one["name"] == "automationdirect-acn")["protocols"] == ["modbus-rtu"]

@@ -226,7 +226,7 @@ def test_undescribed_registers_say_what_they_may_be(sniff485: Run, tmp_path: Pat
     volts = rows[0]
     assert 220 < volts["low"] <= volts["value"] <= volts["high"] < 240
     assert (volts["quality"], volts["samples"], volts["written"]) == (1, 200, 0)
-    assert volts["every ms"] > 500
+    assert volts["every_ms"] > 500
     plain = sniff485("points", capture, "--no-guess")
     assert "guessed" not in plain.out
     assert len(plain.out.splitlines()) == 1 + 9

@@ -24,14 +24,14 @@ def rows(sniff485: Callable[..., Any], tmp_path: Path, gaps: list[float]) -> lis
 
 def test_a_short_capture_has_the_load_that_info_says(sniff485: Callable[..., Any], tmp_path: Path) -> None:
     info, only = rows(sniff485, tmp_path, [20, 100, 100])
-    assert only["load %"] == pytest.approx(100 * info["load"], rel=1e-3)
-    assert only["load %"] > 10
+    assert only["load_percent"] == pytest.approx(100 * info["load"], rel=1e-3)
+    assert only["load_percent"] > 10
 
 
 def test_whole_seconds_are_divided_by_a_second(sniff485: Callable[..., Any], tmp_path: Path) -> None:
     _, *seconds = rows(sniff485, tmp_path, [20, *[100] * 28])
     middle = seconds[1]
-    assert middle["load %"] == pytest.approx(100 * 10 * 8 * CHAR, rel=0.1)
+    assert middle["load_percent"] == pytest.approx(100 * 10 * 8 * CHAR, rel=0.1)
 
 
 def test_a_frame_over_the_boundary_counts_in_both_seconds(sniff485: Callable[..., Any], tmp_path: Path) -> None:
@@ -39,10 +39,10 @@ def test_a_frame_over_the_boundary_counts_in_both_seconds(sniff485: Callable[...
     assert len(seconds) == 2
     whole = sum(row["octets"] for row in seconds)
     assert whole == info["octets"] == 16
-    assert seconds[0]["load %"] > 2.5  # of half a second: one frame, and most of another
-    assert [row["heard s"] for row in seconds] == [pytest.approx(0.509, abs=1e-3), pytest.approx(0.003, abs=1e-3)]
+    assert seconds[0]["load_percent"] > 2.5  # of half a second: one frame, and most of another
+    assert [row["heard_s"] for row in seconds] == [pytest.approx(0.509, abs=1e-3), pytest.approx(0.003, abs=1e-3)]
 
 
 def test_how_much_of_a_row_was_heard_stands_beside_its_load(sniff485: Callable[..., Any], tmp_path: Path) -> None:
     _, *seconds = rows(sniff485, tmp_path, [900, *[100] * 12])
-    assert [row["heard s"] for row in seconds] == [pytest.approx(0.109, abs=1e-3), 1, pytest.approx(0.1, abs=1e-3)]
+    assert [row["heard_s"] for row in seconds] == [pytest.approx(0.109, abs=1e-3), 1, pytest.approx(0.1, abs=1e-3)]

@@ -30,7 +30,7 @@ def test_every_protocol_has_a_programme(sniff485: Ran, protocol: str) -> None:
 def test_properties_are_asked_by_client_device_and_object(sniff485: Ran) -> None:
     out = sniff485("stats", "captures/mstp-usual-faults.cap.txt", "polls", "--json").out
     rows = [json.loads(line) for line in out.splitlines()]
-    asked = {(row["from"], row["station"], row["asks"]) for row in rows if row["request"] == "read-property"}
+    asked = {(row["src"], row["station"], row["asks"]) for row in rows if row["request"] == "read-property"}
     assert (2, 5, "analog-output/0") in asked
     assert (1, 9, "analog-input/4") in asked
 
@@ -45,7 +45,7 @@ def test_names_where_a_profile_is_said(sniff485: Ran) -> None:
 def test_csv_has_all_columns(sniff485: Ran) -> None:
     out = sniff485("stats", "captures/n2-clean.cap.txt", "polls", "--csv").out
     first = next(csv.DictReader(io.StringIO(out)))
-    assert list(first)[:4] == ["from", "station", "request", "asks"]
+    assert list(first)[:4] == ["src", "station", "request", "asks"]
     assert first["first"].startswith("2026-")
 
 

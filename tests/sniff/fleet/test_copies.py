@@ -67,7 +67,7 @@ def test_octets_tell_the_protocol_that_a_file_does_not(tmp_path: Path, capsys: p
     capsys.readouterr()
     (bus,) = _buses(tmp_path, capsys)
     assert (bus["protocol"], bus["findings"]) == ("n2", [])
-    assert bus["days"][0]["damaged"] == 0
+    assert bus["days"][0]["damaged_share"] == 0
 
 
 def test_a_log_without_times_has_no_load(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
