@@ -54,8 +54,6 @@ UNWATCHED = NS_PER_S // 2
 LISTENED = 60 * NS_PER_S
 """ns before which silence says nothing of a bus."""
 
-NOTHING_HEARD = "LN002"
-
 LiveItem = Output | LineEvent | Status | Ended
 LiveTables = Table | Output | LineEvent | Status | Ended
 """Few rows come as objects, many as a table."""
@@ -126,6 +124,7 @@ class LiveBus:
         self._nodes_budget = Budget(NODES_A_SECOND, NODES_AT_ONCE)
         self._listener: BusListener | None = None
         self.model = BusModel(self.session, self.dissector, self.devices, with_points=watched)
+        self.model.is_early = self._is_early
         self.ear = SiteEar()
         self._settle()
 
@@ -152,10 +151,10 @@ class LiveBus:
 
     def findings(self) -> tuple[Finding, ...]:
         """What the rules found so far; that nothing is heard only once it was listened for a while."""
-        found = self.model.findings()
-        if self.model.summary.octets or self.link.clock.now() - self.session.started >= LISTENED:
-            return found
-        return tuple(one for one in found if one.code != NOTHING_HEARD)
+        return self.model.findings()
+
+    def _is_early(self) -> bool:
+        return self.link.clock.now() - self.session.started < LISTENED
 
     @property
     def searching(self) -> SearchProgress | None:

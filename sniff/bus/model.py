@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -25,11 +26,19 @@ if TYPE_CHECKING:
     from sniff.engine.table import Table
 
 
+NOTHING_HEARD = "LN002"
+
+
+def _never() -> bool:
+    return False
+
+
 class BusModel:
     """What is counted, found and measured on one bus.
 
     `summary`: counts, stations, load. `judging`: the rules. `samples`: values that the newest output completed.
     `version` changes whenever anything changed. `reads_points`: whether values and requests are read at all.
+    `is_early`: of a live bus, whether it was listened to for so short a time that silence says nothing of it.
     """
 
     def __init__(
@@ -45,6 +54,7 @@ class BusModel:
         self.devices = devices or Devices()
         self.summary = Summary(session.line, kept_seconds=kept_seconds)
         self.samples: list[Sample] = []
+        self.is_early: Callable[[], bool] = _never
         self.version = 0
         self._use(session, dissector)
 
@@ -148,6 +158,8 @@ class BusModel:
         if version != self.version:
             found = self.judging.findings()
             self._found = self.version, found
+        if found and not self.summary.octets and self.is_early():
+            return tuple(one for one in found if one.code != NOTHING_HEARD)
         return found
 
     def health(self) -> HealthReport:

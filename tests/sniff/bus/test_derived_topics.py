@@ -11,6 +11,7 @@ import pytest
 from dissectors import registry
 from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.bacnet.ring_observer import MstpRingObserver
+from dissectors.line import LineSettings
 from dissectors.simulated_faults import LostResponse
 from sniff.analysis.judging import Judging
 from sniff.bus.derived_topics import BUS, NODE, BusChannels
@@ -20,7 +21,7 @@ from sniff.devices import noted_devices
 from sniff.editing.cutting import around_finding
 from sniff.engine.engine import Output
 from sniff.engine.observer import observe
-from sniff.engine.session import LineEvent, LineEventKind
+from sniff.engine.session import LineEvent, LineEventKind, Session
 from sniff.formats import read
 from sniff.recording.topics import SCHEMAS
 from sniff.simulation.scenarios import scenario, simulate
@@ -122,3 +123,17 @@ def test_findings_about_known_devices_are_told_everywhere() -> None:
     assert "PR001" in {finding.code for finding in model.findings()}
     assert any(json.loads(one.data)["name"] == "PR001" for one in channels.findings(S))
     assert around_finding(capture, session, "PR001")
+
+
+def test_that_nothing_is_heard_is_told_nobody_before_it_was_listened_for_a_while() -> None:
+    """A bus that begins is not silent: no outlet and no recording says so, nor is its health less."""
+    session = Session("x", LineSettings.parse("19200,8E1"), "modbus-rtu")
+    model = BusModel(session, registry.get(session.protocol))
+    early = True
+    model.is_early = lambda: early
+    channels = BusChannels(model)
+    assert not [one for one in channels.findings(0) if b"LN002" in one.data]
+    assert model.health().bus.score == 100
+    early = False
+    assert [one for one in channels.findings(0) if b"LN002" in one.data]
+    assert model.health().bus.score < 100
