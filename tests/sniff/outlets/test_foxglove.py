@@ -103,7 +103,7 @@ def test_a_token_is_asked_for_and_is_in_no_list_of_processes(monkeypatch: pytest
         address = f"ws://127.0.0.1:{made.port}"
 
         async def visit() -> None:
-            with pytest.raises(websockets.exceptions.InvalidStatus):
+            with pytest.raises(websockets.InvalidStatus):
                 await websockets.connect(address, subprotocols=PROTOCOLS)
             async with websockets.connect(f"{address}/?token={TOKEN.replace(' ', '+')}", subprotocols=PROTOCOLS) as one:
                 assert json.loads(await one.recv())["op"] == "serverInfo"
