@@ -3,19 +3,20 @@
 Damage is counted in strikes (`dissectors.strikes`): what a master repeats into one disturbance is one observation.
 
 Noise that falls anywhere strikes each sender as often as it sends octets. So a sender is blamed only where so great a
-part of all damage as it has would seldom come about by its share of the octets; the worst one first, then the others
-among themselves.
+part of all damage as it has would seldom come about by its share of the octets, for any of the senders: of many one is
+always struck most. The worst one is told first, then the others among themselves.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from dissectors.chances import at_least
 from dissectors.modbus.bus_record import BusRecord
 
-_SELDOM = 0.002  # with a handful of senders, one in a hundred buses blames somebody wrongly
-_SELDOM_ALONE = 0.05  # where nobody else has any damage, which speaks for itself
+_SELDOM = 0.01  # that any of all senders is struck so often by what falls anywhere
+_SELDOM_ALONE = 0.05  # the same where nobody else has any damage, which speaks for itself
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +49,9 @@ def shares_of_damage(seen: BusRecord) -> DamageShare:
     if requests and "master" not in blamed:
         share = octets["master"] / sum(octets.values())
         alone = not any(count for sender, count in hits.items() if sender != "master")
-        if at_least(requests, sum(hits.values()), share) < (_SELDOM_ALONE if alone else _SELDOM):
+        if _any_of(octets, octets) * at_least(requests, sum(hits.values()), share) < (
+            _SELDOM_ALONE if alone else _SELDOM
+        ):
             blamed.add("master")
     common = {sender: count for sender, count in frames.items() if count > 0 and sender not in blamed}
     return DamageShare(frozenset(blamed), common)
@@ -65,8 +68,13 @@ def to_blame(hits: dict[str, int], octets: dict[str, int]) -> set[str]:
         if not chances:
             break
         worst = min(chances, key=lambda sender: chances[sender])
-        if chances[worst] >= (_SELDOM_ALONE if len(chances) == 1 else _SELDOM):
+        if _any_of(left, octets) * chances[worst] >= (_SELDOM_ALONE if len(chances) == 1 else _SELDOM):
             break
         blamed.add(worst)
         del left[worst]
     return blamed
+
+
+def _any_of(senders: Iterable[str], octets: dict[str, int]) -> int:
+    """How many of them have sent anything: any of those might have been struck most."""
+    return sum(octets[sender] > 1 for sender in senders)
