@@ -101,7 +101,8 @@ def files_below(words: Iterable[str]) -> list[tuple[str, FileState]]:
     named one, "" for files that lie in it. Raises CaptureError for a word that names nothing."""
     found: dict[str, tuple[str, FileState]] = {}
     for word in words:
-        paths = sorted(glob(word, recursive=True)) if has_magic(word) else [word]
+        is_pattern = has_magic(word) and not os.path.exists(word)  # "plant [2]" may be the name of a folder
+        paths = sorted(glob(word, recursive=True)) if is_pattern else [word]
         if not any(os.path.exists(path) for path in paths):
             raise CaptureError(f"{word}: no such file or folder")
         for path in paths:

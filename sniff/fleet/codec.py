@@ -29,7 +29,7 @@ def encode(days: list[BusDay]) -> str:
 
 
 def decode(text: str) -> list[BusDay]:
-    """The same back. Raises ValueError, KeyError or TypeError for what `encode` did not make."""
+    """The same back. Raises ValueError, KeyError, TypeError or AttributeError for what `encode` did not make."""
     return [_day_of(one) for one in json.loads(text)]
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from html import escape
 
+from dissectors.findings import counted
+from dissectors.words import bare_milliseconds
 from sniff.analysis.sanitizing import sanitized
 from sniff.fleet.answer import Answer, Bus, Day
 from sniff.fleet.bus_day import NO_DATE
@@ -31,7 +33,8 @@ def _parts(found: Answer, title: str) -> Iterator[str]:
     days = sorted({day.day for bus in found.buses for day in bus.days if day.day != NO_DATE})
     ill = sum(bus.is_ill for bus in found.buses)
     span = f"{days[0]} to {days[-1]}" if days else "no day"
-    yield f"<h1>{_safe(title)}</h1><p>{len(found.buses)} buses, {span}: {ill} with something wrong.</p>"
+    buses = counted(len(found.buses), "bus", "buses")
+    yield f"<h1>{_safe(title)}</h1><p>{buses}, {span}: {ill} with something wrong.</p>"
     yield "<table><tr><th>Bus<th class=n>Health<th>Day by day<th class=n>Load<th class=n>Damaged"
     yield "<th class=n>No answer<th class=n>Response p95, ms<th>Findings</tr>"
     for number, bus in enumerate(found.buses):
@@ -103,7 +106,8 @@ def _drift(one: Drift, noun: str) -> str:
     return (
         f"<tr><td>{_safe(noun)} {one.station}"
         f'<td><svg role=img width="{8 * len(times)}" height="26"><title>{_safe(said)}</title>{bars}</svg>'
-        f"<td class=n>{one.before / 1e6:.3g}<td class=n>{one.after / 1e6:.3g}<td class=n>{30 * one.slope / 1e6:+.2g}"
+        f"<td class=n>{bare_milliseconds(one.before)}<td class=n>{bare_milliseconds(one.after)}"
+        f"<td class=n>{'+' if one.slope > 0 else ''}{bare_milliseconds(round(30 * one.slope))}"
         f"<td>{_safe(sure_words(one))}</tr>"
     )
 

@@ -68,14 +68,14 @@ class Index:
         with self._reach() as base:
             for task in tasks:
                 found = base.execute(
-                    "SELECT code, days FROM task WHERE files = ? AND bus = ?", (_files(task), task.bus or "")
+                    "SELECT code, days FROM task WHERE files = ? AND bus = ?", (_files(task), _storable(task.bus or ""))
                 ).fetchone()
                 same = found is not None and found[0] == code_of(task.protocol)
                 yield task, _days(found[1]) if same else None
 
     def put(self, task: Task, days: list[BusDay]) -> None:
         """Keep what was found; it is in the file after `flush`, or by itself after some seconds."""
-        self._new.append((_files(task), task.bus or "", code_of(task.protocol), codec.encode(days)))
+        self._new.append((_files(task), _storable(task.bus or ""), code_of(task.protocol), codec.encode(days)))
         if time.monotonic() - self._flushed > FLUSHED_EVERY:
             self.flush()
 
@@ -108,7 +108,7 @@ class Index:
     def keep_looks(self) -> None:
         """Keep what was new."""
         rows = [
-            (file.path, file.size, file.changed, code_of(""), json.dumps([astuple(one) for one in told]))
+            (_storable(file.path), file.size, file.changed, code_of(""), json.dumps([astuple(one) for one in told]))
             for file, told in self._looked.items()
             if not isinstance(told, str)  # it may be readable another time: permissions, a medium that was away
         ]
@@ -117,8 +117,8 @@ class Index:
 
     def forget_all_but(self, tasks: Sequence[Task]) -> None:
         """Let go of what stands for files that are gone, or that others have followed."""
-        kept = {(_files(task), task.bus or "") for task in tasks}
-        paths = {file.path for task in tasks for file in task.files}
+        kept = {(_files(task), _storable(task.bus or "")) for task in tasks}
+        paths = {_storable(file.path) for task in tasks for file in task.files}
         with self._reach() as base:
             there = base.execute("SELECT files, bus FROM task").fetchall()
             base.executemany("DELETE FROM task WHERE files = ? AND bus = ?", [one for one in there if one not in kept])
@@ -129,7 +129,10 @@ class Index:
         """What the run before over the same folders named as wrong; None where there was none."""
         with self._reach() as base:
             found = base.execute("SELECT value FROM said WHERE name = ?", (_asked(folders),)).fetchone()
-        return None if found is None else set(json.loads(found[0]))
+        try:
+            return None if found is None else {str(one) for one in json.loads(found[0])}
+        except (ValueError, TypeError):
+            return None  # damaged
 
     def say(self, folders: Iterable[str], findings: Iterable[str]) -> None:
         """Keep what this run names, for the next."""
@@ -154,7 +157,7 @@ def _asked(folders: Iterable[str]) -> str:
 def _days(text: str) -> list[BusDay] | None:
     try:
         return codec.decode(text)
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None  # somebody else's, or damaged: it is read again
 
 
@@ -163,8 +166,13 @@ def _begins(text: str) -> tuple[Begin, ...] | None:
         if not text:
             return None
         return tuple(Begin(bus, protocol, part, tuple(of)) for bus, protocol, part, of in json.loads(text))
-    except (ValueError, TypeError, IndexError):
+    except (ValueError, TypeError, RecursionError):
         return None
+
+
+def _storable(name: str) -> str:
+    """A name as the index can hold it: that of a file may be no text. Such a file is looked at every time."""
+    return name.encode("utf-8", "backslashreplace").decode()
 
 
 def _files(task: Task) -> str:

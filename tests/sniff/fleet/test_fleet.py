@@ -292,6 +292,8 @@ def test_a_station_that_slows_down_is_told_with_how_sure(days: list[BusDay]) -> 
         assert {(one.change, one.drift and one.drift.sure) for one in bus.changes} == {(Change.SLOWER, sure)}
     assert "sure: 1 in 2520 by chance" in "\n".join(page(answer(whole(made))))
     assert "ms in 30 days" in html_page(answer(whole(made)))
+    late = [replace(slowed(day, 100 * each), day=f"2026-03-{at:02}") for at, each in enumerate(times, 1)]
+    assert "<td class=n>1100<td class=n>2350<td class=n>+7500<" in html_page(answer(whole(late)))
     steady = [replace(slowed(day, 10 + at % 2), day=f"2026-03-{at:02}") for at in range(1, 20)]
     (bus,) = answer(whole(steady)).buses
     assert bus.changes == ()
@@ -371,6 +373,36 @@ def test_an_index_of_somebody_else_is_refused_or_read_again(made: Made, tmp_path
     with index._reach() as base:
         base.execute("""UPDATE task SET days = '[{"site": 1}]'""")
     assert known(index, tasks[0]) is None
+    with index._reach() as base:
+        base.execute("UPDATE task SET days = '[1, null]'")
+    assert known(index, tasks[0]) is None
+    day = json.loads(codec.encode(read_task(tasks[0])))
+    day[0]["summary"]["nodes"] = []
+    with index._reach() as base:
+        base.execute("UPDATE task SET days = ?", (json.dumps(day),))
+    assert known(index, tasks[0]) is None
+    index.say(["folder"], ["something"])
+    with index._reach() as base:
+        base.execute("UPDATE said SET value = '{'")
+    assert index.said_before(["folder"]) is None
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names are text elsewhere")
+def test_names_that_are_no_text_and_names_like_patterns(tmp_path: Path, made: Made) -> None:
+    folder = tmp_path / "plant [2]"
+    folder.mkdir()
+    (_, file), *_ = files_below([str(made[0] / "north/trunk-00")])
+    shutil.copy(file.path, os.fsencode(folder / "caf") + b"\xe9.mcap")
+    found = files_below([str(folder)])
+    assert [state.size for _, state in found] == [file.size]
+    index = Index(tmp_path / "x.sqlite")
+    for _ in range(2):
+        tasks, _ = tasks_of(found, look=index.look())
+        index.keep_looks()
+        index.put(tasks[0], [])
+        index.flush()
+        index.forget_all_but(tasks)
+    assert known(index, tasks[0]) == []
 
 
 def test_a_recording_of_several_buses_is_several_buses(made: Made, tmp_path: Path) -> None:
