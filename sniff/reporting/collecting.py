@@ -117,6 +117,7 @@ def collect(
         measurement=_measurement(session, dissector),
         ring=None if dissector.ring is None else _ring(dissector.ring, model.ring()),
         values=tuple(_value(trend, session) for trend in trends.moved(VALUES_SHOWN)),
+        happenings_left_out=told.left_out,
     )
     return numbers if session.has_times else numbers.without_times()
 

@@ -18,11 +18,12 @@ GOOD = frozenset((Verdict.ANSWERED, Verdict.BROADCAST, Verdict.DATA, Verdict.OPE
 
 
 class Happenings:
-    """`happenings`: the first of them; `trouble`: by station, how often what went wrong."""
+    """`happenings`: the first of them; `left_out`: how many more; `trouble`: by station, how often what went wrong."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
         self.happenings: list[Happening] = []
+        self.left_out = 0
         self.trouble: dict[int, Counter[str]] = {}
 
     def add(self, output: Output) -> None:
@@ -49,11 +50,15 @@ class Happenings:
         if len(self.happenings) < HAPPENINGS_SHOWN:
             at = seconds_since(self._session.started, event.moment)
             self.happenings.append(Happening(at, event.kind.value, event.text, event.number))
+        else:
+            self.left_out += 1
 
     def merge(self, later: Happenings) -> Happenings:
         """Both together, as a new value; `later` is of the same capture."""
         whole = Happenings(self._session)
-        whole.happenings = (self.happenings + later.happenings)[:HAPPENINGS_SHOWN]
+        both = self.happenings + later.happenings
+        whole.happenings = both[:HAPPENINGS_SHOWN]
+        whole.left_out = self.left_out + later.left_out + len(both) - len(whole.happenings)
         for part in (self, later):
             for station, kinds in part.trouble.items():
                 whole.trouble.setdefault(station, Counter()).update(kinds)

@@ -201,6 +201,7 @@ class CaptureNumbers:
     measurement: Measurement
     ring: RingNumbers | None = field(default=None)
     values: tuple[ValueTrend, ...] = ()
+    happenings_left_out: int = 0
 
     def without_times(self) -> CaptureNumbers:
         """The same of a capture that does not say when anything came."""

@@ -54,7 +54,7 @@ KINDS = {
     "load": Kind(lambda session: Summary(session.line), lambda summary: (summary.load.share(), summary.load.total)),
     "nodes": Kind(lambda session: Summary(session.line), lambda summary: list(summary.nodes.present())),
     "timeline": Kind(lambda session: Timeline(session.line.char)),
-    "report": Kind(Happenings, lambda told: (told.happenings, told.trouble)),
+    "report": Kind(Happenings, lambda told: (told.happenings, told.left_out, told.trouble)),
 }
 
 

@@ -15,6 +15,7 @@ import pytest
 
 from sniff.cli import main
 from sniff.reporting.numbers import CaptureNumbers
+from sniff.reporting.page import page
 from tests.sniff.reporting.page_reading import CAPTURES, SCRIPT, Page
 
 pytest.importorskip("matplotlib", reason="needs sniff485[report]")
@@ -219,3 +220,13 @@ def test_a_row_of_many_words_keeps_its_begin_and_what_is_wrong_with_it(
     assert cut
     assert all(text.startswith("A → ") and text.endswith("expected]") for text in cut)
     assert max(len(text) for text in rows) <= 180
+
+
+def test_what_is_not_listed_is_counted(
+    monkeypatch: pytest.MonkeyPatch, hostile: Path, numbers_of: Callable[[Path], CaptureNumbers]
+) -> None:
+    monkeypatch.setattr("sniff.reporting.happenings.HAPPENINGS_SHOWN", 1)
+    hostile.write_text(hostile.read_text() + "#! +6 note two\n#! +7 note three\n")
+    numbers = numbers_of(hostile)
+    assert (len(numbers.happenings), numbers.happenings_left_out) == (1, 2)
+    assert "Those are the first 1; 2 more came later." in Page(page([numbers])).text
