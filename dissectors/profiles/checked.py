@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+_MOST = 1e300
+_MOST_NUMBERS = 65536
+"""No larger number, and no more numbers in a list, than anything of a device can need."""
+
 
 class ProfileError(ValueError):
     """A profile that cannot be used; the message names file, key and what was expected."""
@@ -41,7 +45,7 @@ class CheckedTable:
     def number(self, key: str, default: float | None = None) -> float:
         """A number."""
         value = self._value(key, default)
-        if not isinstance(value, int | float) or isinstance(value, bool) or value != value:
+        if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < _MOST:
             raise self.error(key, f"expected a number, not {value!r}")
         return float(value)
 
@@ -64,7 +68,7 @@ class CheckedTable:
         value = self._value(key, list(default) if default is not None else None)
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
             raise self.error(key, f"expected a list of texts, not {value!r}")
-        return tuple(value)
+        return tuple(self.spoken(key, item) for item in value)
 
     def pair(self, key: str) -> tuple[float, float] | tuple[None, None]:
         """A range as [low, high]; Nones when absent."""
@@ -72,7 +76,7 @@ class CheckedTable:
         if value == ():
             return None, None
         good = isinstance(value, list) and len(value) == 2 and all(type(item) in (int, float) for item in value)
-        if not good or value[0] > value[1]:
+        if not good or not -_MOST < value[0] <= value[1] < _MOST:
             raise self.error(key, f"expected [low, high], not {value!r}")
         return float(value[0]), float(value[1])
 
@@ -123,8 +127,12 @@ class CheckedTable:
             try:
                 span = range(int(first), int(last if dash else first) + 1)
             except ValueError:
-                raise self.error(key, f"{word!r}: expected numbers and spans, for instance 0-19 26") from None
-            found.extend(span[:65536])
+                span = range(0)
+            if not span:
+                raise self.error(key, f"{word!r}: expected numbers and spans, for instance 0-19 26")
+            found.extend(span[:_MOST_NUMBERS])
+            if len(found) > _MOST_NUMBERS:
+                raise self.error(key, f"expected at most {_MOST_NUMBERS} numbers")
         if len(set(found)) != len(found):
             raise self.error(key, "has a number twice")
         return tuple(found)

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
-from dissectors.profiles.model import Entry, EntryRole, Kind, Profile
+from dissectors.profiles.model import WORD_SPACES, Entry, EntryRole, Kind, Profile
 from dissectors.readings import Origin, Reading
 
 MOST_WORDS = 128
@@ -32,7 +32,6 @@ _SMALL, _PLACES = 0.01, 4
 """So many places of a scaled number are shown; of one below that, three significant digits where it has them."""
 
 _FIRST = {"coil": 0, "discrete": 1, "input": 3, "holding": 4}
-_REGISTERS = ("holding", "input")
 _ASIDE = re.compile(r" \([^()]*\)$")
 """Behind a title: which parameter of the device the thing is, or what else. A line has no room for it, the tree has."""
 _PARAMETER = re.compile(r"[A-Za-z]+2?\.\d+|\d\d-\d\d")
@@ -93,7 +92,7 @@ def decode(profile: Profile | None, readings: Sequence[Reading]) -> tuple[Value,
         if entry is None or entry.reserved:
             values.append(_attribute(profile, reading) if reading.part else _plain(reading))
             continue
-        if entry.kind.registers == 1 or reading.space not in _REGISTERS:
+        if entry.kind.registers == 1 or reading.space not in WORD_SPACES:
             values += _values(entry, reading, (reading.raw,))
             continue
         steps = range(entry.kind.registers)
@@ -297,7 +296,7 @@ def _values(entry: Entry, reading: Reading, raws: Sequence[int | None]) -> Itera
 
 def _scaled(entry: Entry, reading: Reading, raws: Sequence[int | None]) -> tuple[int | float | str, int | None]:
     """The value of an entry and its bits on the wire, in the order of significance; as read where it has none."""
-    if entry.kind in (Kind.REAL, Kind.BIT, Kind.TEXT) or reading.space not in _REGISTERS or None in raws:
+    if entry.kind in (Kind.REAL, Kind.BIT, Kind.TEXT) or reading.space not in WORD_SPACES or None in raws:
         value = reading.value
         if isinstance(value, str) or (entry.scale == 1 and not entry.offset):
             return value, reading.raw

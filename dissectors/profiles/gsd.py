@@ -53,7 +53,7 @@ _KEPT = (
     "Set_Slave_Add_supp",
     "Fail_Safe",
 )
-_MOST_LINES = 100_000
+_MOST_LINES, _MOST_MODULES = 100_000, 1000
 
 
 def is_gsd(text: str) -> bool:
@@ -97,15 +97,18 @@ def parse_gsd(text: str, origin: str) -> Profile:
 
 def _lines(text: str) -> Iterator[str]:
     """Lines without comments; a line that ends with a backslash goes on in the next one."""
-    held = ""
+    held: list[str] = []
     for raw in text.splitlines()[:_MOST_LINES]:
-        line = held + _without_comment(raw).strip()
+        line = _without_comment(raw).strip()
+        if not line.isprintable():
+            line = "".join(c if c.isprintable() else " " for c in line)
         if line.endswith("\\"):
-            held = line[:-1]
+            held.append(line[:-1])
             continue
-        held = ""
-        if line:
-            yield line
+        whole = "".join((*held, line))
+        held.clear()
+        if whole:
+            yield whole
 
 
 def _without_comment(line: str) -> str:
@@ -132,7 +135,7 @@ def _numbers(said: Mapping[str, str]) -> dict[str, int]:
 
 
 def _modules(modules: list[str]) -> dict[str, str | int]:
-    return {f"Module_{at}": value for at, value in enumerate(modules[:64], 1)}
+    return {f"Module_{at}": value for at, value in enumerate(modules[:_MOST_MODULES], 1)}
 
 
 def _kept(value: str) -> str | int:

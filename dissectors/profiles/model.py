@@ -66,6 +66,9 @@ class EntryRole(Enum):
 _OUTPUTS = "dp-output"
 """The table of cyclic outputs: a master gives all of them to a station at once, over and over."""
 
+WORD_SPACES = ("holding", "input", "dp-input", _OUTPUTS)
+"""Tables of 16-bit words, several of which may be one value."""
+
 
 @dataclass(frozen=True, slots=True)
 class Bit:
@@ -141,6 +144,12 @@ class Entry:
     bits: tuple[Bit, ...] = ()
     parts: tuple[BitField, ...] = ()
     doubt: str = ""
+
+    @property
+    def places(self) -> tuple[tuple[str, int], ...]:
+        """Where it stands: the table and the address of each of its registers."""
+        count = self.kind.registers if self.space in WORD_SPACES else 1
+        return tuple((self.space, self.address + step) for step in range(count))
 
     @property
     def decimals(self) -> int:
@@ -274,11 +283,7 @@ class Profile:
     _places: Mapping[tuple[str, int], Entry] = field(init=False, repr=False, compare=False, hash=False)
 
     def __post_init__(self) -> None:
-        places = {
-            (entry.space, entry.address + step): entry
-            for entry in self.entries
-            for step in range(entry.kind.registers if entry.space in ("holding", "input") else 1)
-        }
+        places = {place: entry for entry in self.entries for place in entry.places}
         object.__setattr__(self, "_places", places)
 
     def at(self, space: str, address: int) -> Entry | None:

@@ -58,7 +58,7 @@ def _loaded(text: str, origin: str) -> dict[str, Any]:
 
     try:
         return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # no TOML, or a number of more digits than Python reads
         raise ProfileError(f"{origin}: {error}") from None
 
 

@@ -108,6 +108,10 @@ def _parameters(
 ) -> tuple[list[Entry], list[str]]:
     """A group of parameters whose register is `base` plus the parameter's number."""
     prefix, base, digits = table.text("prefix"), table.whole("base"), table.whole("digits", 2)
+    if not is_name(f"{prefix}0"):
+        raise table.error("prefix", f"{prefix!r}: expected letters, digits, dots and hyphens")
+    if not 1 <= digits <= 9:
+        raise table.error("digits", "expected 1 … 9")
     title = table.text("title", "parameter")
     access = Access(table.choice("access", [access.value for access in Access], "rw"))
     present, absent = table.numbers("present"), table.numbers("absent")
@@ -140,14 +144,14 @@ def _parameters(
 
 def _n2_place(table: CheckedTable) -> tuple[str, int]:
     space, _, number = table.text("object").partition(" ")
-    if space not in N2_REGIONS or not number.isdigit() or int(number) > 255:
+    if space not in N2_REGIONS or not _is_number(number, 255):
         raise table.error("object", f'expected "AI 1": one of {", ".join(N2_REGIONS)} and 0 … 255')
     return space, int(number)
 
 
 def _bacnet_place(table: CheckedTable) -> tuple[str, int]:
     space, _, number = table.text("object").partition(" ")
-    if not re.fullmatch(r"[a-z][a-z-]*", space) or not number.isdigit() or int(number) > 0x3FFFFF:
+    if not re.fullmatch(r"[a-z][a-z-]*", space) or not _is_number(number, 0x3FFFFF):
         raise table.error("object", 'expected "analog-input 0": object type and instance')
     return space, int(number)
 
@@ -156,7 +160,7 @@ def _word_place(table: CheckedTable) -> tuple[str, int, str]:
     """ "input 3" → the table of cyclic words, the place in it, and what people call it."""
     told = table.text("word")
     direction, _, number = told.partition(" ")
-    if direction not in ("input", "output") or not number.isdigit() or int(number) > 121:
+    if direction not in ("input", "output") or not _is_number(number, 121):
         raise table.error("word", 'expected "input 0" or "output 0": the words of cyclic data, from 0 to 121')
     return f"dp-{direction}", int(number), told
 
@@ -252,7 +256,7 @@ def _bit(table: CheckedTable, number: int, value: Any) -> Bit:
 
 def _part(table: CheckedTable) -> BitField:
     low, high = table.pair("bits")
-    if low is None or high is None or not 0 <= low <= high <= 31:
+    if low is None or high is None or not 0 <= low <= high <= 31 or low % 1 or high % 1:
         raise table.error("bits", "expected [lowest, highest] within 0 … 31")
     states = table.words("states")
     part = BitField(int(low), int(high), _name(table, "name"), states, _roles(table, "states"))
@@ -331,10 +335,11 @@ def _sign(table: CheckedTable, modbus: CheckedTable) -> Sign:
         space, address = "holding", table.whole("register") + modbus.whole("address-offset", 0)
     else:
         word, _, number = table.text("object").partition(" ")
-        space, address = word, int(number) if number.isdigit() else -1
+        space, address = word, int(number) if _is_number(number, 0x3FFFFF) else -1
     value = table.data.get("value")
     if "value" in table and not isinstance(value, int | float | str):
         raise table.error("value", f"expected a number or a text, not {value!r}")
+    value = table.spoken("value", value) if isinstance(value, str) else value
     sign = Sign(space, address, table.text("part", ""), value, table.text("title", ""))
     table.finish()
     return sign
@@ -354,20 +359,23 @@ def _check(profile: Profile) -> None:
     names: dict[tuple[str, str], Entry] = {}
     units: dict[str, Entry] = {}
     for entry in profile.entries:
-        steps = entry.kind.registers if entry.space in REGISTER_TABLES else 1
-        for place in ((entry.space, entry.address + step) for step in range(steps)):
+        for place in entry.places:
             other = places.setdefault(place, entry)
             if other is not entry:
                 raise ProfileError(f"{profile.origin}: {entry.number}: is already {other.name!r} ({other.number})")
         other = names.setdefault((entry.space, entry.name), entry)
         if other is not entry:
             raise ProfileError(f"{profile.origin}: {entry.number}: name {entry.name!r} is taken by {other.number}")
-        other = units.setdefault(entry.name, entry)
-        if other.unit != entry.unit:
+        if (other := units.setdefault(entry.name, entry)).unit != entry.unit:
             raise ProfileError(
                 f"{profile.origin}: {entry.number}: {entry.name!r} in {entry.unit or 'no unit'!r}, "
                 f"but {other.number} has it in {other.unit or 'no unit'!r}"
             )
+
+
+def _is_number(text: str, most: int) -> bool:
+    """Whether a text is a number, 0 … `most`."""
+    return re.fullmatch("[0-9]{1,9}", text) is not None and int(text) <= most
 
 
 def is_name(text: str) -> bool:

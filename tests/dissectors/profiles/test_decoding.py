@@ -146,6 +146,25 @@ def test_a_doubt_is_marked_once() -> None:
         assert say(drive, (Reading("dp-input", 0, word, word, Origin.READ),)) == said
 
 
+def test_cyclic_words_have_a_sign_and_may_be_two_of_one_value() -> None:
+    profile: Any = device("""
+[[profibus.word]]
+word = "input 0"
+name = "speed"
+type = "s16"
+scale = 0.1
+unit = "rpm"
+[[profibus.word]]
+word = "input 1"
+name = "energy"
+type = "u32"
+unit = "kWh"
+""")
+    words = tuple(Reading("dp-input", at, raw, raw, Origin.READ) for at, raw in enumerate((0xFFF6, 1, 2)))
+    assert say(profile, words) == "speed -1.0 rpm; energy 65538 kWh"
+    assert say(profile, words[:2]) == "speed -1.0 rpm; energy, high word 1"
+
+
 def test_cyclic_outputs_are_sent_whole_and_what_is_reserved_in_them_as_0() -> None:
     drive = packaged("teco-f510")
     zeros = tuple(Reading("dp-output", at, 0, 0, Origin.WRITE) for at in range(16))

@@ -36,6 +36,13 @@ def test_what_a_gsd_file_says() -> None:
     assert profile.document == PUMP
 
 
+def test_control_characters_and_long_lines_are_no_matter() -> None:
+    text = PUMP.replace("Pump 7", "Pump\x1b[2J 7").replace("2 words", "2\twords") + "User = 1,\\\n" * 20_000
+    profile = parse_text(text, "pump.gsd")
+    assert profile.models == ("Pump [2J 7",)
+    assert profile.facts["Module_1"] == '"2 words in" 0x51'
+
+
 def test_a_gsd_file_is_found_by_its_path(tmp_path: Path) -> None:
     path = tmp_path / "PUMP.GSD"
     path.write_text(PUMP.replace("Example", "Müller"), encoding="latin-1")

@@ -225,6 +225,20 @@ vendor-name = "X"
         ("[n2.limits]\nframe = 0", "n2.limits"),
         ("[n2.limits]\nfraem = 3", "n2.limits.fraem: unknown key; did you mean 'frame'?"),
         ("[modbus.parameters]", "modbus.parameters"),
+        ("scale = inf", "modbus.register[1].scale"),
+        (f"scale = {10**400}", "modbus.register[1].scale"),
+        ("range = [0, nan]", "modbus.register[1].range"),
+        (f"default = {'1' * 5000}", "pump.toml"),
+        ("reserved-bits = '9-3'", "modbus.register[1].reserved-bits: '9-3'"),
+        (f"reserved-codes = '{' '.join(['0-65535'] * 2)}'", "modbus.register[1].reserved-codes: expected at most"),
+        ("[[modbus.register.part]]\nname = 'a'\nbits = [0.5, 3]", "modbus.register[1].part[1].bits"),
+        ("[modbus.limits]\nresponse-ms = inf", "modbus.limits.response-ms"),
+        ("[modbus.limits]\nstations = [1, inf]", "modbus.limits.stations"),
+        ("[[modbus.parameters]]\nprefix = 'P '\nbase = 0", "modbus.parameters[1].prefix"),
+        ("[[modbus.parameters]]\nprefix = 'P'\nbase = 0\ndigits = -3", "modbus.parameters[1].digits"),
+        ("[[n2.object]]\nobject = 'AI ²'\nname = 'b'", "n2.object[1].object"),
+        (f"[[bacnet.object]]\nobject = 'device {'1' * 5000}'\nname = 'b'", "bacnet.object[1].object"),
+        ('[[sign]]\nobject = "device 0"\nvalue = "a\\u001b"', "sign[1].value: has a control character"),
         ("[[modbus.parameters]]\nprefix = 'P'\nbase = 0\npresent = '1'\nabsent = '1'", "modbus.parameters[1].absent"),
         ("[whatever]", "whatever: unknown key"),
         ("x = ", "pump.toml"),
@@ -234,6 +248,11 @@ def test_a_mistake_is_told_with_file_and_key(text: str, key: str) -> None:
     with pytest.raises(ProfileError, match=r"pump\.toml") as told:
         register(text)
     assert key in str(told.value)
+
+
+def test_a_list_of_texts_has_no_control_character() -> None:
+    with pytest.raises(ProfileError, match="models: has a control character"):
+        parse({"name": "x", "title": "x", "protocols": [], "models": ["\x1b[2J"]}, "x")
 
 
 values = st.recursive(
