@@ -112,13 +112,15 @@ def without_text(octets: bytes, blanked: Callable[[bytes], bytes] = _blank) -> b
 def inflicted(damaged: bytes, whole: bytes, renamed: bytes) -> bytes:
     """What happened to `whole`, so that `damaged` came, done to `renamed` (as long as `whole`).
 
-    Octets missing at an end are left out there, a swap of the last two is a swap again, every other error is XORed.
+    Octets missing at an end are left out there, a swap of the last two is a swap again where that shows, every other
+    error is XORed.
     """
     missing = len(whole) - len(damaged)
     if missing < 0:
         return damaged
-    if not missing and damaged[-2:] != whole[-2:] and damaged == whole[:-2] + whole[-2:][::-1]:
-        return renamed[:-2] + renamed[-2:][::-1]
+    swapped = renamed[:-2] + renamed[-2:][::-1]
+    if damaged != whole and swapped != renamed and damaged == whole[:-2] + whole[-2:][::-1]:
+        return swapped
     front = min(range(missing + 1), key=lambda at: _errors(damaged, whole[at:]))
     window = zip(damaged, whole[front:], renamed[front:], strict=False)
     return bytes(was ^ right ^ new for was, right, new in window)

@@ -57,8 +57,10 @@ class AsciiRenamer:
         """The frame under another name, with the same damage; what is after the hexadecimal digits stays."""
         if frame.repair is not None:
             whole = frame.repair.octets
-            return inflicted(frame.octets, whole, self._renamed(whole, intact=True))
-        return self._renamed(frame.octets, intact=frame.ok, check=frame.damage is Damage.CHECK)
+            made = inflicted(frame.octets, whole, self._renamed(whole, intact=True))
+        else:
+            made = self._renamed(frame.octets, intact=frame.ok, check=frame.damage is Damage.CHECK)
+        return _with_bit_7(made, frame.octets)
 
     def _renamed(self, octets: bytes, *, intact: bool, check: bool = False) -> bytes:
         text = bytes(octet & 0x7F for octet in octets)
@@ -83,3 +85,19 @@ class AsciiRenamer:
             if was is not None and was != becomes:
                 result[1 + 2 * at : 3 + 2 * at] = b"%02X" % becomes
         return bytes(result)
+
+
+def _with_bit_7(made: bytes, sent: bytes) -> bytes:
+    """Characters in place of others, as many; where bit 7 of those is a parity bit, so it is of these."""
+    if not any(character & 0x80 for character in sent):
+        return made
+    bits = max(_BITS_7, key=lambda bits: sum(c & 0x80 == bits[c & 0x7F] for c in sent))
+    return bytes(
+        new & 0x7F | old & 0x80 ^ bits[old & 0x7F] ^ bits[new & 0x7F] for new, old in zip(made, sent, strict=True)
+    )
+
+
+_BITS_7 = tuple(
+    bytes(0x80 * ((c.bit_count() + odd) & 1 or always) for c in range(0x80)) for odd, always in ((0, 0), (1, 0), (0, 1))
+)
+"""Bit 7 by character: even parity, odd parity, always set."""

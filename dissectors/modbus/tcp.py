@@ -138,11 +138,7 @@ class TcpRenamer:
         """The frame under another name."""
         octets = frame.octets
         if not frame.ok or len(octets) < HEADER + 2:
-            return (
-                octets[:HEADER]
-                + bytes(self.stations.if_known(octet) for octet in octets[HEADER : HEADER + 1])
-                + octets[HEADER + 1 :]
-            )
+            return octets[:HEADER] + self.rtu.damaged_pdu(octets[HEADER:])
         return octets[:HEADER] + self.rtu.pdu(octets[HEADER:])
 
 

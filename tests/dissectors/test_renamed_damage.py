@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import pytest
 
 from dissectors.bacnet.renamer import MstpRenamer
 from dissectors.checksums import crc8_mstp, crc16_modbus, crc16_x25, lrc
-from dissectors.frame import Check, Damage, FoundBy, Frame
+from dissectors.frame import Check, Chunk, Damage, Flaw, FoundBy, Frame, Repair
+from dissectors.line import Timing
+from dissectors.modbus.ascii_framing import AsciiFramer
+from dissectors.modbus.envelope import make_ascii
 from dissectors.modbus.renamer import AsciiRenamer, RtuRenamer
+from dissectors.modbus.tcp import TcpRenamer
+from dissectors.n2.envelope import judge, make_command
+from dissectors.n2.renamer import N2Renamer
 from dissectors.pseudonyms import inflicted
 
 WHOLE = bytes.fromhex("55ff00090100000000")[:8]
@@ -33,6 +42,12 @@ def test_a_flaw_is_inflicted_again(damaged: bytes, expected: bytes) -> None:
 
 def test_swapped_check_octets_are_swapped_again() -> None:
     assert inflicted(b"\x01\x02\x04\x03", b"\x01\x02\x03\x04", b"\x09\x02\x05\x06") == b"\x09\x02\x06\x05"
+
+
+def test_check_octets_that_are_alike_are_wrong_all_the_same() -> None:
+    made = inflicted(b"\x01\x02\x04\x03", b"\x01\x02\x03\x04", b"\x09\x02\x05\x05")
+    assert made[:2] == b"\x09\x02"
+    assert made[2:] != b"\x05\x05"
 
 
 def test_the_error_of_a_header_check_stays_and_unheard_addresses_keep_their_number() -> None:
@@ -91,6 +106,55 @@ def test_a_damaged_modbus_answer_loses_its_texts_and_keeps_its_error() -> None:
     renamed = AsciiRenamer()(_frame(spoilt, Check.BAD, Damage.FORM))
     assert (len(renamed), renamed[:7]) == (len(spoilt), spoilt[:7])
     assert NAME[4:8].hex().upper().encode() not in renamed
+
+
+def test_a_damaged_frame_of_tcp_loses_its_texts() -> None:
+    octets = bytes([0, 1, 0, 0, 0, 60, 3, 43, 14, 1, 1, 0, 0, 1, 0, len(NAME)]) + NAME[:20]
+    renamed = TcpRenamer()(_frame(octets, Check.ABSENT, Damage.SHORT))
+    assert renamed == octets[:16] + b"x" * 20
+
+
+def _even(characters: bytes) -> bytes:
+    return bytes(c | 0x80 * (c.bit_count() & 1) for c in characters)
+
+
+@pytest.mark.parametrize("parity", [_even, lambda octets: bytes(c ^ 0x80 for c in _even(octets))], ids=["even", "odd"])
+def test_an_ascii_frame_with_its_parity_in_bit_7_stays_good(parity: Callable[[bytes], bytes]) -> None:
+    rename = AsciiRenamer()
+    rename.stations.of(200)
+    line = parity(make_ascii(17, bytes.fromhex("0300000002")))
+    framer = AsciiFramer(Timing())
+    (frame,) = [*framer.feed(Chunk(10**9, line)), *framer.close()]
+    assert isinstance(frame, Frame)
+    renamed = rename(frame)
+    assert (frame.ok, renamed) == (True, parity(make_ascii(2, bytes.fromhex("0300000002"))))
+    spoilt = line[:5] + bytes([line[5] ^ 0x81]) + line[6:]
+    renamed = rename(_frame(spoilt, Check.BAD, Damage.CHECK))
+    assert [at for at, c in enumerate(renamed) if parity(bytes([c & 0x7F])) != bytes([c])] == []
+    spoilt = line[:5] + bytes([line[5] ^ 0x80]) + line[6:]
+    renamed = rename(_frame(spoilt, Check.BAD, Damage.FORM))
+    assert [at for at, c in enumerate(renamed) if parity(bytes([c & 0x7F])) != bytes([c])] == [5]
+
+
+def test_a_damaged_n2_command_has_no_address_of_its_own_and_the_same_error() -> None:
+    rename = N2Renamer()
+    assert rename.stations.of(10) == 1
+    asked, renamed = make_command("05110A03"), make_command("02110A03")
+    swapped, wrong = asked[:-3] + b"B9\r", asked[:-3] + b"9C\r"
+    for damaged, becomes, repair in (
+        (asked[1:], renamed[1:], Repair(Flaw.FIRST_MISSING, asked)),
+        (b"\x7f" + asked[1:], b"\x7f" + renamed[1:], Repair(Flaw.FIRST_SPOILT, asked)),
+        (asked[:-2], renamed[:-2], Repair(Flaw.LAST_TWO_MISSING, asked)),
+        (swapped, renamed[:-3] + b"89\r", Repair(Flaw.CHECK_SWAPPED, asked)),
+        (wrong, renamed[:-3] + b"99\r", None),  # one too many, where the address is one less
+        (b">051", b">021", None),
+        (b"A05", b"A05", Repair(Flaw.LAST_MISSING, b"A05\r")),
+    ):
+        frame = replace(_frame(damaged, Check.BAD, Damage.CHECK), repair=repair)
+        assert rename(frame) == becomes
+    alike = make_command("05110A04")  # 9C; with another address 99
+    frame = replace(_frame(alike[:-3] + b"C9\r", Check.BAD, Damage.CHECK), repair=Repair(Flaw.CHECK_SWAPPED, alike))
+    assert judge(rename(frame))[1] is Damage.CHECK
 
 
 def test_a_count_that_could_be_a_letter_stays_a_count() -> None:
