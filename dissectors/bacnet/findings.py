@@ -270,7 +270,8 @@ def _uses_both(ring: Ring, mac: int, node: RingNode) -> bool:
 def _answers(ring: Ring) -> Iterable[Remark]:
     for mac, node in ring.nodes.items():
         if node.postponed >= 5 and node.postponed > POSTPONED_SHARE * node.requests_received:
-            seen = f"{node.postponed} of {counted(node.requests_received, 'request')} answered with Reply Postponed"
+            asked = max(node.requests_received, node.postponed)  # some may have come damaged, or not at all
+            seen = f"{node.postponed} of {counted(asked, 'request')} answered with Reply Postponed"
             if node.service.count and ring.timing.has_times:
                 median, most = measured(node.service.quantile(0.5)), measured(node.service.most)
                 seen += f"; the real answers took {median}, up to {most}"

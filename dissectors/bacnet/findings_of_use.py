@@ -181,14 +181,14 @@ def _storm(ring: Ring) -> Iterable[Remark]:
     for happened in storms.values():
         together = happened if together is None else together.merge(happened)
     assert together is not None
-    if together.last - together.first < STORM_LEAST:
+    if together.most < STORM_LEAST:
         return
     sent = {mac: ring.nodes[mac].broadcasts_sent for mac in storms}
     total = sum(node.broadcasts_sent for node in ring.nodes.values())
     most = max(sent, key=lambda mac: sent[mac])
     alone = sent[most] >= STORM_OF_ONE * total
     who = f"{sent[most]} of them by MAC {most}" if alone else f"most by MAC {listed(sorted(sent))}"
-    lasted = (together.last - together.first) / NS_PER_S
+    lasted = together.most / NS_PER_S
     seen = f"{counted(total, 'broadcast')}, {who}; over 20 a second for at least {lasted:.0f} s"
     yield of("MS602", most if alone else None, seen, together)
 

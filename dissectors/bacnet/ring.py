@@ -98,7 +98,7 @@ class RingNode:
         return RingNode(
             **merged,
             highest_polled=max(self.highest_polled, other.highest_polled),
-            first=min(self.first, other.first),
+            first=min((one.first for one in (self, other) if one.first), default=0),  # 0: never heard
             last=max(self.last, other.last),
             last_token=max(self.last_token, other.last_token),
             last_polled=max(self.last_polled, other.last_polled),

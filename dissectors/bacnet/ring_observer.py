@@ -259,8 +259,9 @@ class MstpRingObserver(TokenWatch):
         node.data_sent += 1
         if destination == BROADCAST:
             node.broadcasts_sent += 1
-            if self._storms.see(frame.end):
-                self._tally.note(RingEventKind.STORM, frame.start, no, source)
+            storm = self._storms.see(frame.end)
+            if storm is not None:
+                self._tally.note(RingEventKind.STORM, frame.start, no, source, None, storm)
         if not answers:
             self._hold += 1
             self._questions.end_postponed(frame, source, destination, node)

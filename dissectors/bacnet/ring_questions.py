@@ -10,6 +10,7 @@ from dissectors.bacnet.frame_types import CARRIES_NPDU, PROPRIETARY, FrameType
 from dissectors.bacnet.held_reads import HeldReads, surely_over
 from dissectors.bacnet.limits import MAX_MASTER, MS, T_NO_TOKEN, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.message import data_of, more_follows
+from dissectors.bacnet.open_exchanges import POSTPONED_FOR
 from dissectors.bacnet.ring_events import RingEvent, RingEventKind
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
 from dissectors.bacnet.ring_window import Happening
@@ -116,12 +117,13 @@ class RingQuestions:
 
     def end_postponed(self, frame: Frame, source: int, destination: int, node: NodeTally) -> None:
         """Data that may be the answer which was postponed."""
-        for waiting in self._postponed:
+        for waiting in tuple(self._postponed):
             server, client, asked_at = waiting
             if server == source and client == destination:
-                node.service.add(frame.start - asked_at)
                 self._postponed.remove(waiting)
-                return
+                if frame.start - asked_at < POSTPONED_FOR:  # else its answer was not heard, and this is something else
+                    node.service.add(frame.start - asked_at)
+                    return
 
     def _answers(
         self, asked: AskedInRing, no: int, frame: Frame, frame_type: int, source: int, destination: int, node: NodeTally

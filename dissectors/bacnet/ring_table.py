@@ -96,7 +96,7 @@ def _happened(ring: Ring) -> list[str]:
 def _of_time(ring: Ring) -> list[str]:
     """How the time is used."""
     said = [
-        f"{ring.frames} frames in {ring.span / 1e9:.1f} s; bus load {ring.load:.1%}",
+        f"{counted(ring.frames, 'frame')} in {ring.span / 1e9:.1f} s; bus load {ring.load:.1%}",
         f"unanswered polls for masters take {ring.poll_waste_share:.1%} of the time",
         *_users(ring),
     ]
@@ -119,7 +119,7 @@ def _users(ring: Ring) -> list[str]:
         said.append(f"the token is longest with {shares}")
     broadcasts = sum(node.broadcasts_sent for node in ring.nodes.values())
     if broadcasts and ring.span:
-        said.append(f"{broadcasts} broadcasts, {broadcasts / (ring.span / 1e9):.1f} a second")
+        said.append(f"{counted(broadcasts, 'broadcast')}, {broadcasts / (ring.span / 1e9):.1f} a second")
     return said
 
 

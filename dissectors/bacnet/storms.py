@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from dissectors.bacnet.limits import MS
 
@@ -16,15 +16,23 @@ class Storms:
 
     def __init__(self) -> None:
         self._newest: deque[int] = deque(maxlen=STORM_BROADCASTS)
+        self._since: int | None = None  # the first of the storm that goes on
 
-    def see(self, time: int) -> bool:
-        """Whether this one is the last of STORM_BROADCASTS within STORM_WITHIN."""
+    def see(self, time: int) -> int | None:
+        """How long (ns) a storm has lasted, where this one is the last of STORM_BROADCASTS within STORM_WITHIN."""
         newest = self._newest
         newest.append(time)
-        return len(newest) == STORM_BROADCASTS and 0 <= time - newest[0] <= STORM_WITHIN
+        if len(newest) < STORM_BROADCASTS or not 0 <= time - newest[0] <= STORM_WITHIN:
+            self._since = None
+            return None
+        if self._since is None:
+            self._since = newest[0]
+        return time - self._since
 
-    def see_many(self, times: Iterable[int]) -> None:
+    def see_many(self, times: Sequence[int]) -> None:
         """Take broadcasts of which it is known that they are no storm."""
+        if times:
+            self._since = None
         self._newest.extend(times)
 
     @property
