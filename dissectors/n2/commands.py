@@ -177,5 +177,11 @@ def expected_length(octets: bytes) -> int | None:
     return None
 
 
+def has_other_length(octets: bytes) -> bool:
+    """Whether it begins as a command that is longer or shorter: right by its sum, it may be two frames all the same."""
+    expected = expected_length(octets) if octets[:1] == b">" else None
+    return expected is not None and expected != len(octets)
+
+
 def _hex(text: str, width: int) -> int | None:
     return int(text, 16) if len(text) == width and is_hex(text) else None

@@ -136,7 +136,7 @@ def _ends_repaired(octets: bytes, least: int) -> list[tuple[Flaw, bytes]]:
     made = [(Flaw.LAST_MISSING, octets + b"\r")]
     if len(octets) >= max(2, least):
         made.append((Flaw.LAST_SPOILT, octets[:-1] + b"\r"))
-    if len(octets) >= least - 1 and len(octets) >= 4:
+    if len(octets) >= max(4, least - 2):
         data, digit = octets[1:-1], octets[-1:].upper()
         check = b"%02X" % sum8(data)
         if check[:1] == digit:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 from dissectors.frame import Check, Chunk, Damage, Event, FoundBy, Frame, LineError, Noise, Place, Reason
 from dissectors.framer import OctetWindow, Taken
 from dissectors.line import NS_PER_S, Timing
-from dissectors.n2.commands import Command, expected_length, parse_command
+from dissectors.n2.commands import Command, expected_length, has_other_length, parse_command
 from dissectors.n2.envelope import COMMAND, CR, NOT_TEXT, is_good, judge
 from dissectors.n2.stretch import SHORTEST, Before, N2Stretch, Piece, good_whole
 
@@ -56,6 +56,8 @@ class N2Framer:
         self._foreign = False  # a `:` since the last line end
         self._waits = False  # a command has no answer yet
         self._asked: Command | None = None  # which, where it was good
+        self._command = b""  # its octets
+        self._short = (0, 0)  # octets that lacked when the command before it, and it itself, was given back
         self._proved = False  # a checksum was right: this bus does speak N2
         self._attached = False  # the held noise stands directly after a frame
         self._skipped = 0
@@ -155,7 +157,8 @@ class N2Framer:
         start = self._start
         seams = tuple(seam - start for seam in self._seams if start < seam < end)
         octets = bytes(self._window.octets[start:end])
-        return N2Stretch(octets, damage, seams, self._before, self._waits, self._asked, self._proved)
+        known = self._waits, self._asked, self._proved, self._command, self._short[0]
+        return N2Stretch(octets, damage, seams, self._before, *known)
 
     def _conclude(self, end: int, damage: Damage | None) -> None:
         """Give what was collected up to `end`."""
@@ -179,7 +182,7 @@ class N2Framer:
     def _takes_at_once(self, end: int) -> bool:
         """Take a stretch that is one good frame, or too short for any that nobody waits for: nearly all are."""
         octets = bytes(self._window.octets[self._start : end])
-        if octets.rfind(b">") > 0:
+        if octets.rfind(b">") > 0 or has_other_length(octets) or (self._short[0] and octets == self._command):
             return False
         check = good_whole(octets, self._before, waits=self._waits, proved=self._proved) if len(octets) > 1 else None
         if check is not None:
@@ -256,10 +259,15 @@ class N2Framer:
         self._attached = True
         if is_command:
             self._waits = True
-            self._asked = parse_command(told) if piece.damage is None or piece.repair is not None else None
+            if piece.damage is None:
+                self._short = self._short[1], 0
+            elif octets and self._command.startswith(octets):
+                self._short = self._short[0], len(self._command) - len(octets)
+            self._command = told if piece.damage is None or piece.repair is not None else b""
+            self._asked = parse_command(told) if self._command else None
         elif piece.damage is None or (piece.repair is not None and is_good(told)):
             # any other damaged one may have been junk, and the answer come yet
-            self._waits, self._asked = False, None
+            self._waits, self._asked, self._command = False, None, b""
         self._proved |= piece.damage is None and check is Check.GOOD
         self._foreign = False
         self._before = Before.LINE_END

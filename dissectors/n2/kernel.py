@@ -2,8 +2,8 @@
 
 A frame is what stands between two CR, where that is good by itself: `>` with a right checksum, `A` alone or with a
 right checksum, `N` with two hex digits. Left out, and so doubtful: all that is damaged, holds another `>` or an octet
-that is no text, is written in small letters or too long, frames with proved silence of two characters inside, and
-marked reads.
+that is no text, is written in small letters or too long, a command directly behind another that may hold an answer,
+frames with proved silence of two characters inside, and marked reads.
 """
 
 from __future__ import annotations
@@ -53,7 +53,20 @@ def kernel(reads: Reads, timing: Timing) -> FrameColumns:
     if reads.marked.any():
         good &= ~holds_any(begins, ends, np.flatnonzero(np.repeat(reads.marked, reads.lengths)))
     offset = begins[good]
-    return _columns(octets, times, offset, ends[good] - offset, checked[good])
+    found = _columns(octets, times, offset, ends[good] - offset, checked[good])
+    two = np.zeros(len(found), bool)
+    two[1:] = _may_be_two(octets, found)
+    return found.take(~two) if two.any() else found
+
+
+def _may_be_two(octets: Octets, found: FrameColumns) -> Masks:
+    """Which frames but the first may be the command before, given back cut short, and the answer to it."""
+    offset, length, expected = found.offset, found.length, found.expected
+    begins = octets.take(offset) == COMMAND
+    again = begins[1:] & begins[:-1] & (offset[1:] == offset[:-1] + length[:-1])
+    ends = (length[1:] == length[:-1]) & (octets.take(offset[1:] + length[1:] - 2) == ANSWER)
+    two: Masks = again & (ends | ((expected[1:] != NONE) & (expected[1:] != length[1:])))
+    return two
 
 
 def _good(octets: Octets, begins: Times, ends: Times) -> tuple[Masks, Masks]:

@@ -9,7 +9,8 @@ What stands in it is decided when its end is seen, because its begin proves litt
    are noise: any bus may carry such octets.
 3. A good answer that ends a bad stretch is cut out where it begins after proved silence; or, while a command waits for
    it, where it may answer that command and what stands before it is no answer itself: at most STRAY octets, an octet
-   that is no text, or the whole command that lost its CR.
+   that is no text, or the whole command that lost its CR. Behind the command that waits, given back at once without
+   its last one or two octets, any answer to it is believed: the two together may look like another command.
 4. What is left is one damaged frame where it looks like one: text, that begins with `>`, or where an answer is due.
    One thing put right at one of its ends may show what it was (`Repair`).
 """
@@ -43,6 +44,7 @@ STRAY: Final = 3
 SHORTEST: Final = 4
 """Fewest octets of a damaged frame that nobody waits for."""
 
+_ACKNOWLEDGED = b"A\r"
 _WITH_CHECK = 6  # octets of the shortest answer with a checksum
 _LEAST: Final = 4  # octets of text that may be a damaged frame without its first octet
 _STARTS = frozenset((ANSWER, REFUSAL))
@@ -87,8 +89,9 @@ class N2Stretch:
     """Octets and what is known about them.
 
     `damage`: why it ended without CR, None where it ends with one. `seams`: where silence was proved inside it.
-    `waits`: whether an answer is due; `asked`: the good command that waits for it. `proved`: whether a checksum was
-    right before: this bus does speak N2.
+    `waits`: whether an answer is due; `asked`: the good command that waits for it, `command`: its octets. `proved`:
+    whether a checksum was right before: this bus does speak N2. `short`: octets that lacked when the command before
+    was given back.
     """
 
     octets: bytes
@@ -98,6 +101,8 @@ class N2Stretch:
     waits: bool
     asked: Command | None
     proved: bool
+    command: bytes = b""
+    short: int = 0
 
     def pieces(self) -> list[Piece]:
         """Take it apart; the pieces cover it without a gap."""
@@ -121,10 +126,11 @@ class N2Stretch:
 
     def _apart(self) -> list[Piece]:
         """Take apart what holds no command but at its begin."""
-        whole = self._whole()
+        at = self._behind_cut_echo()
+        whole = self._whole() if at is None else None
         if whole is not None:
             return [whole]
-        at = self._good_answer()
+        at = self._good_answer() if at is None else at
         if at is None:
             return self._damaged()
         check, damage = judge(self.octets[at:])
@@ -146,6 +152,21 @@ class N2Stretch:
         if self.damage is not None:
             return at if is_good(command + b"\r") else None
         return at if is_good(command) or expected_length(command) == len(command) else None
+
+    def _behind_cut_echo(self) -> int | None:
+        """Where the answer begins behind the command that waits for it, given back and cut short."""
+        command, octets = self.command, self.octets
+        if self.damage is not None or not self.waits or self.asked is None:
+            return None
+        if octets == command and self.short != len(_ACKNOWLEDGED):
+            return None
+        for at in (len(command) - 2, len(command) - 1):
+            answer = octets[at:]
+            if at < _LEAST or octets[:at] != command[:at] or answer[:1] not in (b"A", b"N"):
+                continue
+            if judge(answer)[1] is None and may_answer(self.asked, answer):
+                return at
+        return None
 
     def _whole(self) -> Piece | None:
         """The stretch as one good frame (rule 2)."""
@@ -316,6 +337,10 @@ class N2Stretch:
             places.add(0)
         return sorted(places)
 
+    @property
+    def _known(self) -> tuple[bool, Command | None, bool, bytes, int]:
+        return self.waits, self.asked, self.proved, self.command, self.short
+
     def _noise(self, size: int) -> list[Piece]:
         return [Piece(size)] if size else []
 
@@ -323,10 +348,10 @@ class N2Stretch:
         """What stands before the place."""
         seams = tuple(seam for seam in self.seams if seam < at)
         damage = Damage.RESTARTED if self.octets[at : at + 1] == b">" else Damage.FORM
-        return N2Stretch(self.octets[:at], damage, seams, self.before, self.waits, self.asked, self.proved)
+        return N2Stretch(self.octets[:at], damage, seams, self.before, *self._known)
 
     def _from(self, at: int) -> N2Stretch:
         """What stands from the place on."""
         seams = tuple(seam - at for seam in self.seams if seam > at)
         before = Before.LINE_END if at in self.seams else Before.TEXT
-        return N2Stretch(self.octets[at:], self.damage, seams, before, self.waits, self.asked, self.proved)
+        return N2Stretch(self.octets[at:], self.damage, seams, before, *self._known)

@@ -164,3 +164,30 @@ def test_a_repaired_frame_shows_what_it_was_and_stays_damaged():
     told = interpret(request, response)
     assert told.value == 72.5
     assert "first octet missing, repaired" in told.tentative
+
+
+# --- echoes that are cut short ----------------------------------------------------------------------------------------
+
+IDENTIFY, TYPE = b">01FA7\r", b"A1061\r"
+
+
+@pytest.mark.parametrize("latency", [0, 17 * MS])
+@pytest.mark.parametrize("short", [1, 2])
+@pytest.mark.parametrize(("command", "answer"), [*EXCHANGES, (IDENTIFY, TYPE)])
+def test_behind_an_echo_without_its_end_the_answer_is_good(command, answer, short, latency):
+    events = wire(POLL, ACK, command, command[:-short] + answer, latency=latency)
+    assert good(events) == [POLL, ACK, command, answer]
+    assert events[-1].octets == answer
+
+
+def test_the_echo_of_a_short_command_is_put_right():
+    events = wire(POLL, ACK, IDENTIFY, IDENTIFY[:-2], TYPE)
+    assert repairs(events) == [Repair(Flaw.LAST_TWO_MISSING, IDENTIFY)]
+
+
+def test_an_echo_that_an_acknowledgement_makes_whole_is_whole_unless_the_one_before_was_cut():
+    command = next(one for one in (b">%02X04" % at for at in range(256)) if sum(one[1:]) & 0xF == 10)
+    command += b"%02X\r" % (sum(command[1:]) & 0xFF)
+    assert good(wire(POLL, POLL, ACK, command, command)) == [POLL, POLL, ACK, command, command]
+    cut = wire(POLL, POLL[:-2], ACK, command, command[:-2] + ACK, pause=MS)
+    assert good(cut) == [POLL, ACK, command, ACK]
