@@ -18,7 +18,7 @@ from dissectors.profibus.slave_watch import SlaveView
 from dissectors.profibus.watch import BusWatch, Notice
 from dissectors.subject import BUS, Subject, station
 from dissectors.tracker import Placement, Transaction, Verdict
-from dissectors.words import milliseconds
+from dissectors.words import duration, milliseconds
 
 _ALIKE_LEAST = 5
 _BAD_KEPT = 64  # damaged telegrams whose exchange is not over
@@ -305,7 +305,7 @@ class ProfibusFindings:
         for (what, address), tally in sorted(self._noted.items(), key=lambda one: (one[0][0].value, one[0][1])):
             if what is Notice.CLAIM:
                 seen = f"station {address} made a token of its own {times(tally.count)}"
-                yield tally.found(RULES["PB013"], BUS, seen + self._woken_seen())
+                yield tally.found(RULES["PB013"], BUS, seen + self._held_seen() + self._woken_seen())
             elif what is Notice.TOKEN_AGAIN:
                 seen, grave = (
                     f"the token to it was sent again {times(tally.count)}",
@@ -326,6 +326,7 @@ class ProfibusFindings:
             elif what is Notice.CLEAR_PERHAPS and (Notice.CLEAR, address) not in self._noted:
                 seen = f"{self._clear_seen(address)}; octets were damaged since, its end may not have been heard"
                 yield tally.found(RULES["PB012"], station(address), seen, Severity.NOTE)
+        yield from self._of_kept()
         ring = self.watch.ring()
         for address, view in sorted(ring.masters.items()):
             if view.polls > view.answered:
@@ -333,6 +334,27 @@ class ProfibusFindings:
                 share = ring.wasted / ring.span if ring.span else 0
                 seen = f"{tally.count} of {view.polls} polls found nobody; all masters' take {share:.1%} of the time"
                 yield tally.found(RULES["PB016"], station(address), seen)
+
+    def _of_kept(self) -> Iterator[Finding]:
+        kept, ring = self.watch.kept(), self.watch.ring()
+        if kept is None:
+            return
+        tally = Tally()
+        tally.add(ring.last - kept.time)
+        tally.add(ring.last)
+        waits = f"{'station' if len(kept.others) == 1 else 'stations'} {', '.join(map(str, kept.others))}"
+        seen = (
+            f"asks on for {duration(kept.time)} and does not pass the token to {waits}, up to the end; before, a round "
+        )
+        finding = tally.found(RULES["PB021"], station(kept.master), f"{seen}took up to {duration(kept.usual)}")
+        yield replace(finding, count=1)
+
+    def _held_seen(self) -> str:
+        """Who had the tokens that were lost, where it was one and the same again and again."""
+        held = self.watch.claimed_from
+        if len(held) != 1 or held.total() < _LEAST:
+            return ""
+        return f"; station {next(iter(held))} had the token each time"
 
     def _woken_seen(self) -> str:
         woken = sorted(address for (what, address) in self._noted if what is Notice.WOKE)

@@ -215,6 +215,16 @@ RULES: dict[str, Rule] = {
             "the device's firmware; whether something on the way changes or swallows octets",
             explains=("PB001", "PB002", "PB003", "PB007", "PB008", *_LINE),
         ),
+        Rule(
+            "PB021",
+            Severity.ERROR,
+            "keeps the token",
+            "A master that used to pass the token on asks on for more than a second, and ten times the longest round "
+            "before, up to the end, and passes no token, with nothing damaged. The others cannot speak meanwhile.",
+            "its firmware hangs in one task, or it has begun to work as the only master",
+            "restart that master; its bus parameters (target rotation time, highest station address)",
+            explains=("PB013", "PB019"),
+        ),
     )
 }
 """The catalogue, by code."""

@@ -5,6 +5,7 @@ What it notices it tells as events to whoever judges; the ring as a value is mad
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import Enum, auto
@@ -22,6 +23,10 @@ from dissectors.profibus.telegram import HIGHEST, Telegram, parse
 CLEAR_LONG = 5 * NS_PER_S
 """ns of data exchange in Clear that are more than a start."""
 
+_KEPT_ROUNDS = 10
+"""Times the longest round of the token so far, for which no master has reason to keep it."""
+
+_ROUNDS_LEAST = 8
 _LEAST_CLAIM = 6 * 37
 """Bit times of silence after which the lowest master makes a new token: six slot times, of 37 bits at least."""
 
@@ -78,6 +83,17 @@ class _Master:
     following: dict[int, int] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True)
+class KeptToken:
+    """A master that has the token and does not pass it on. `time`: for how long, `usual`: the longest round before, ns.
+    `others`: who had it in turns with this one."""
+
+    master: int
+    time: int
+    usual: int
+    others: tuple[int, ...]
+
+
 Told = Callable[[Notice, int, int, int], None]
 """(what, station, number of the frame, ns)"""
 
@@ -103,6 +119,7 @@ class BusWatch:
         self._holder: int | None = None
         self._interruption: _Interruption | None = None  # until it is known whether a token was missed at this tap
         self._robbed: int | None = None  # who lost the token to another one that gave it up; until it speaks in turn
+        self.claimed_from: Counter[int] = Counter()  # who had the tokens that others then made anew
         self._newest = b""  # the newest request, while no token or other request came after it
         self._longest_clear: dict[int, int] = {}
         self._token: tuple[int, int] | None = None  # source and destination of the last token, nothing after it
@@ -144,6 +161,18 @@ class BusWatch:
     def longest_clear(self, master: int) -> int:
         """For how long a master exchanged data in Clear without a break, at most, ns."""
         return self._longest_clear.get(master, 0)
+
+    def kept(self) -> KeptToken | None:
+        """Who has the token at last, asks on, and does not pass it on as it used to; None if nobody is sure to."""
+        holder = None if self._holder is None else self._masters.get(self._holder)
+        if holder is None or holder.got is None or not self._newest or not self._timing.has_times:
+            return None
+        usual, time = holder.rotation.quantile(1), self._last - holder.got
+        others = tuple(at for at, one in sorted(self._masters.items()) if one.view.tokens and one is not holder)
+        if usual is None or holder.rotation.count < _ROUNDS_LEAST or not others or self._holder is None:
+            return None
+        is_long = time > max(NS_PER_S, _KEPT_ROUNDS * usual)
+        return KeptToken(self._holder, time, usual, others) if is_long else None
 
     def ring(self) -> Ring:
         """The ring so far."""
@@ -203,6 +232,7 @@ class BusWatch:
         if is_again:
             self._tell(Notice.TOKEN_AGAIN, to, no, frame.start)
         elif is_claim and was_in_ring:
+            self.claimed_from[self._holder or 0] += 1
             self._tell(Notice.CLAIM, source, no, frame.start)
         if not is_claim:
             giver.following[to] = giver.following.get(to, 0) + 1
