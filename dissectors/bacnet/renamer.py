@@ -26,6 +26,8 @@ MOST_INSTANCE = 4_194_303
 LONGEST_NUMBER = 4
 """Octets; what is longer behind a context tag is no number, and may be a text in any code."""
 
+_ADDRESSES, _NET_AND_LENGTH = 2, 3  # octets of an NPDU before its addresses, and of each before its station
+
 _WIDE = re.compile(rb"(?:\x00[ -~]){4,}\x00?|(?:[ -~]\x00){4,}")  # two octets a character
 
 
@@ -79,10 +81,13 @@ class MstpRenamer:
         if header is None or header.error is not None:
             return self._without_text(data)
         front = bytearray(data[: header.body])
+        at = _ADDRESSES
         for named in (header.dadr, header.sadr):
-            if named:
-                place = bytes(front).find(named)
-                front[place : place + len(named)] = bytes(len(named) - 1) + bytes([self.stations.of(named[-1])])
+            if named is not None:
+                at += _NET_AND_LENGTH
+                if named:
+                    front[at : at + len(named)] = bytes(len(named) - 1) + bytes([self.stations.of(named[-1])])
+                at += len(named)
         body = data[header.body :]
         if header.is_network_message:
             return bytes(front) + body

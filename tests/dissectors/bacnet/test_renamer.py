@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import pytest
+
+from dissectors.bacnet import npdu
+from dissectors.bacnet.envelope import npdu_frame
 from dissectors.bacnet.renamer import MstpRenamer
 from dissectors.checksums import crc8_mstp, crc16_x25
 from dissectors.frame import Check, FoundBy, Frame
@@ -45,3 +51,18 @@ def test_passwords_and_names_of_two_octets_a_character() -> None:
     wide = _renamed(MstpRenamer(), bytes.fromhex("3c01000112 7512 04") + "Chiller 1".encode("utf-16-be"))
     assert b"C" not in wide
     assert b"h" not in wide
+
+
+@pytest.mark.parametrize("dadr", [b"\x01", b"\x64", b"\x24", b"\x05", b"\xc0\xa8\x01\x0a\xba\xc0"])
+@pytest.mark.parametrize("sadr", [b"", b"\x01", b"\x05"])
+def test_a_station_behind_a_router_is_renamed_where_it_stands(dadr: bytes, sadr: bytes) -> None:
+    """Its address may be any number: one that stands elsewhere in the header too."""
+    rename = MstpRenamer()
+    asked = npdu.encode(bytes.fromhex("00050112"), dnet=0x64, dadr=dadr, snet=5 if sadr else None, sadr=sadr)
+    whole = Frame("mstp", npdu_frame(1, 2, asked, True), 0, 0, Check.GOOD, FoundBy.DELIMITER)
+    told, was = npdu.decode(rename(whole)[8:-2]), npdu.decode(asked)
+    assert told is not None
+    assert was is not None
+    new = bytes(len(dadr) - 1) + bytes([rename.stations.of(dadr[-1])])
+    assert replace(told, dadr=dadr, sadr=was.sadr) == was
+    assert (told.dadr, told.sadr) == (new, bytes([rename.stations.of(sadr[-1])]) if sadr else None)
