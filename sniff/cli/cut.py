@@ -1,4 +1,5 @@
-"""Times: seconds from the start (+12.5) or ISO 8601 (2026-03-01T10:00:12.5Z). Frames: numbers as `show` has them.
+"""Times: seconds from the start (+12.5, 90s, 5m), a time of day (10:00:12.5, UTC) or ISO 8601 (2026-03-01T10:00:12.5Z).
+Frames: numbers as `show` has them.
 --around takes the code of a finding, as `check` has it, and cuts from its first to its last evidence.
 """
 

@@ -22,7 +22,10 @@ if TYPE_CHECKING:
     from sniff.engine.blocks import Block
     from sniff.engine.table import Table
 
-_SECONDS = re.compile(r"\+?(\d+(?:\.\d{1,9})?)")
+_SECONDS = re.compile(r"\+?(\d+(?:\.\d{1,9})?) ?(ms|s|m|min|h)?")
+_UNITS = {"ms": 10**6, None: NS_PER_S, "s": NS_PER_S, "m": 60 * NS_PER_S, "min": 60 * NS_PER_S, "h": 3600 * NS_PER_S}
+_CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2})(?:\.(\d{1,9}))?)?")
+_DAY = 24 * 3600 * NS_PER_S
 _FRAMES = re.compile(r"(\d+)?(?:[-–:](\d+)?)?")
 
 
@@ -42,17 +45,33 @@ FOREVER = 1 << 62
 
 
 def parse_time(text: str, session: Session) -> int:
-    """ "+12.5" (seconds from the start) or ISO 8601 (UTC where no zone is said) → ns. Raises ValueError."""
-    match = _SECONDS.fullmatch(text.strip())
-    if match is not None:
+    """ "+12.5", "90s" (from the start), "10:02:03.5" (the first one) or ISO 8601 → ns. UTC where no zone
+    is said. Raises ValueError."""
+    text = text.strip()
+    if (match := _SECONDS.fullmatch(text)) is not None:
         whole, _, fraction = match[1].partition(".")
-        return session.started + int(whole) * NS_PER_S + int(fraction.ljust(9, "0"))
+        return session.started + (int(whole) * 10**9 + int(fraction.ljust(9, "0"))) * _UNITS[match[2]] // 10**9
     try:
-        moment = datetime.fromisoformat(text.strip())
+        if (clock := _CLOCK.fullmatch(text)) is not None:
+            return _of_day(clock, session.started)
+        moment = datetime.fromisoformat(text)
     except ValueError:
-        raise ValueError(f"time {text!r}: expected seconds from the start (+12.5) or 2026-03-01T10:00:12.5Z") from None
+        raise ValueError(
+            f"time {text!r}: expected seconds from the start (+12.5), 10:00:12.5 (UTC) or 2026-03-01T10:00:12.5Z"
+        ) from None
     whole = moment.timestamp() if moment.tzinfo is not None else moment.replace(tzinfo=UTC).timestamp()
     return int(whole) * NS_PER_S + moment.microsecond * 1000
+
+
+def _of_day(clock: re.Match[str], start: int) -> int:
+    """The first one behind `start` (ns), or up to an hour before it: a capture may begin a little after 10:00."""
+    hours, minutes, seconds = (int(part or 0) for part in clock.group(1, 2, 3))
+    if hours > 23 or minutes > 59 or seconds > 59:
+        raise ValueError
+    of_day = (hours * 3600 + minutes * 60 + seconds) * NS_PER_S + int((clock[4] or "").ljust(9, "0"))
+    time = start - start % _DAY + of_day
+    early = 3600 * NS_PER_S
+    return time - _DAY if time - start >= _DAY - early else time + _DAY if start - time > early else time
 
 
 def of_frames(capture: ReadSource, session: Session, text: str, reference: bool = False) -> Stretch:

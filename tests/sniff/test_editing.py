@@ -10,10 +10,12 @@ import pytest
 
 from dissectors.checksums import crc16_modbus
 from dissectors.frame import Chunk, Frame
+from dissectors.line import LineSettings
 from dissectors.pseudonyms import Blanks
 from sniff.bus.capture_writer import create
 from sniff.bus.offline import settled
 from sniff.editing.anonymising import anonymised, anonymous_session
+from sniff.editing.cutting import parse_time
 from sniff.editing.merging import merged
 from sniff.engine.session import Item, LineEvent, Session
 from sniff.formats import read
@@ -319,3 +321,30 @@ def test_a_target_that_is_a_source_is_refused(tmp_path: Path, sniff485: Callable
     before = path.read_bytes()
     assert sniff485("convert", "-f", path, path)[0] == 2
     assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("text", "after"),
+    [
+        ("12.5", 12.5),
+        ("+90s", 90),
+        ("1.5 ms", 0.0015),
+        ("2m", 120),
+        ("1h", 3600),
+        ("10:00", -5),
+        ("10:00:07.25", 2.25),
+        ("02:00:00", 16 * 3600 - 5),  # of the next day
+        ("23:00:00", 13 * 3600 - 5),
+        ("2026-03-01T10:00:06Z", 1),
+        ("2026-03-01T11:00:06+01:00", 1),
+    ],
+)
+def test_times_as_people_write_them(text: str, after: float) -> None:
+    session = Session("x", LineSettings.parse("19200,8E1"), "modbus-rtu", started=1772359205 * 10**9)
+    assert parse_time(text, session) - session.started == round(after * 10**9)
+
+
+@pytest.mark.parametrize("text", ["24:00", "10:60", "noon", "-3", "10 parsecs"])
+def test_what_is_no_time(text: str) -> None:
+    with pytest.raises(ValueError, match=r"expected seconds from the start \(\+12.5\)"):
+        parse_time(text, Session("x", LineSettings.parse("19200,8E1"), "modbus-rtu"))
