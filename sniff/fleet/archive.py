@@ -97,8 +97,9 @@ class Unreadable:
 
 
 def files_below(words: Iterable[str]) -> list[tuple[str, FileState]]:
-    """Site and state of every capture: `words` are folders, files and patterns. The site is the first folder below the
-    named one, "" for files that lie in it. Raises CaptureError for a word that names nothing."""
+    """Site and state of every capture, and of folders that do not let one look: `words` are folders, files and
+    patterns. The site is the first folder below the named one, "" for files that lie in it. Raises CaptureError for a
+    word that names nothing."""
     found: dict[str, tuple[str, FileState]] = {}
     for word in words:
         is_pattern = has_magic(word) and not os.path.exists(word)  # "plant [2]" may be the name of a folder
@@ -117,12 +118,16 @@ def _captures(path: Path) -> Iterable[tuple[str, Path]]:
     if path.is_file():
         yield path.parent.name, path
         return
-    for folder, names, files in os.walk(path):
+    closed: list[OSError] = []
+    for folder, names, files in os.walk(path, onerror=closed.append):
         names.sort()
         inside = Path(folder).relative_to(path).parts
         for name in sorted(files):
             if name.lower().endswith(suffixes()) and not name.endswith(".expect.txt"):
                 yield (inside[0] if inside else ""), Path(folder, name)
+    for error in closed:  # what is in there is not passed over in silence
+        inside = Path(error.filename).relative_to(path).parts
+        yield (inside[0] if inside else ""), Path(error.filename)
 
 
 def _state(path: Path) -> FileState | None:
@@ -153,6 +158,8 @@ Look = Callable[[FileState], "tuple[Begin, ...] | str"]
 
 def look(file: FileState) -> tuple[Begin, ...] | str:
     """Read the begin of a file."""
+    if os.path.isdir(file.path):
+        return "a folder that cannot be looked into"
     try:
         capture = read(file.path)
     except CaptureError as error:

@@ -387,6 +387,23 @@ def test_an_index_of_somebody_else_is_refused_or_read_again(made: Made, tmp_path
     assert index.said_before(["folder"]) is None
 
 
+def test_a_folder_that_cannot_be_looked_into_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "north" / "trunk"
+    folder.mkdir(parents=True)
+    listed = os.scandir
+
+    def refusing(path: str) -> object:
+        if Path(path) == folder:
+            raise PermissionError(13, "Permission denied", str(path))
+        return listed(path)
+
+    monkeypatch.setattr(os, "scandir", refusing)
+    _, unreadable = tasks_of(files_below([str(tmp_path)]))
+    assert [(one.site, one.file.path, one.why) for one in unreadable] == [
+        ("north", str(folder), "a folder that cannot be looked into")
+    ]
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="names are text elsewhere")
 def test_names_that_are_no_text_and_names_like_patterns(tmp_path: Path, made: Made) -> None:
     folder = tmp_path / "plant [2]"
