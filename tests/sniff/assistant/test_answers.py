@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 from collections.abc import Sequence
 from importlib.util import find_spec
 
@@ -141,3 +142,17 @@ def test_what_a_command_prints_is_read_up_to_a_bound() -> None:
     said = asyncio.run(Asking().ask(["rule"], most_octets=500))
     assert not said.whole
     assert 0 < sum(len(line) + 1 for line in said.lines) <= 500
+
+
+def test_what_a_command_prints_is_read_as_it_was_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    began: list[dict[str, str]] = []
+
+    async def begin(*arguments: str, env: dict[str, str] | None = None, **more: object) -> None:
+        began.append(env or dict(os.environ))
+        raise OSError("no more than that")
+
+    monkeypatch.setenv("PYTHONIOENCODING", "latin-1")  # as in a language of one octet a character
+    monkeypatch.setattr(asyncio, "create_subprocess_exec", begin)
+    with pytest.raises(OSError, match="no more"):
+        asyncio.run(Asking().ask(["info"]))
+    assert [one["PYTHONIOENCODING"] for one in began] == ["utf-8"]
