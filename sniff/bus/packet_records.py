@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from dissectors import registry
+from dissectors.findings import counted
 from dissectors.frame import Frame
 from dissectors.manifest import PacketFile
 from sniff.analysis.wording import describe, duration
@@ -95,7 +96,7 @@ class RecordMaker:
             if shown not in {"answered", "data", "broadcast"}:
                 notes.append(shown)
         if row.event.marks:
-            notes.append(f"{len(row.event.marks)} octets with line errors")
+            notes.append(f"{counted(len(row.event.marks), 'octet')} with line errors")
         if row.no in self.notes:
             notes.append(self.notes[row.no])
         return "; ".join(notes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -9,6 +10,9 @@ if TYPE_CHECKING:
     from sniff.analysis.site_ear import SiteEar
     from sniff.analysis.site_findings import SiteBus
     from sniff.bus.model import BusModel
+
+_OF_FILE = re.compile(r"(.*?\.\w+) \[[^/\\]*\]", re.DOTALL)
+"""A file with a suffix, and a bus in it."""
 
 
 def site_bus(model: BusModel, ear: SiteEar, findings: tuple[Finding, ...] | None = None) -> SiteBus:
@@ -28,5 +32,9 @@ def site_bus(model: BusModel, ear: SiteEar, findings: tuple[Finding, ...] | None
 
 
 def site_name(source: str) -> str:
-    """The recording that a bus is one of, by how its captures are called: "site.mcap [boiler]"."""
-    return source.split(" [", 1)[0]
+    """The recording that a bus is one of, by how its captures are called: "site.mcap [boiler]". Folders and files may
+    have brackets in their names, too."""
+    if not source.endswith("]"):
+        return source
+    of_file = _OF_FILE.fullmatch(source)
+    return source.split(" [", 1)[0] if of_file is None else of_file[1]
