@@ -25,13 +25,13 @@ def blamed(senders: Mapping[str, Damages], strikes: Strikes) -> dict[str, Tally]
     is named, and so is the only one that has any, where chance would seldom have struck it alone. What is left is the
     bus's."""
     left = {name: sent for name, sent in senders.items() if sent.octets}
-    octets = sum(sent.octets for sent in left.values())
     named: dict[str, Tally] = {}
     while worst := _outstanding(left, strikes):
         named[worst] = left.pop(worst).bad
     struck = {name: sent.bad for name, sent in left.items() if sent.bad.count}
     if len(struck) == 1:
         ((name, _),) = struck.items()
+        octets = sum(sent.octets for sent in left.values())  # who is named already has no part in what is left
         chance = (left[name].octets / octets) ** strikes.of(name, left[name].bad.count)
         if chance * len(left) <= SELDOM_ALONE:  # any of them might have been struck alone
             return named | struck

@@ -200,8 +200,10 @@ def _unheard(heard: N2Evidence) -> Iterator[Finding]:
         return
     tally, asked = together(missed.values()), sum(heard.stations[address].asked for address in missed)
     whose = ", ".join(map(str, sorted(missed)[:MANY_POINTS])) + (" and more" if len(missed) > MANY_POINTS else "")
-    seen = f"{tally.count} of {asked} answers (of {'station' if len(missed) == 1 else 'stations'} {whose}) were not "
-    seen += "heard: the master went on to another command, sooner than it gives up"
+    seen = f"{tally.count} of {counted(asked, 'answer')} (of {'station' if len(missed) == 1 else 'stations'} {whose}) "
+    seen += (
+        f"{'was' if asked == 1 else 'were'} not heard: the master went on to another command, sooner than it gives up"
+    )
     yield heard.noted_if(heard.is_rare(tally, asked), tally.found(RULES["N2015"], "bus", seen))
 
 
@@ -230,7 +232,7 @@ def _missing(heard: N2Evidence, name: str, station: N2StationRecord) -> Finding:
         if station.turns <= 1 and station.asked <= TRIES:
             tries = "the only command" if station.asked == 1 else f"the {station.asked} commands of one turn"
             return tally.found(rule, name, f"no answer to {tries}", Severity.NOTE)
-        return tally.found(rule, name, f"no answer to any of {station.asked} commands", Severity.ERROR)
+        return tally.found(rule, name, f"no answer to any of {counted(station.asked, 'command')}", Severity.ERROR)
     finding = tally.found(rule, name, f"no answer to {tally.count} of {counted(station.asked, 'command')}")
     return heard.noted_if(heard.is_rare(tally, station.asked), finding)
 

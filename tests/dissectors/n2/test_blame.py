@@ -47,6 +47,11 @@ def test_the_only_one_that_is_struck_is_named():
     assert blame(master=(5000, 0), first=(5000, 0)) == {}
 
 
+def test_who_is_named_has_no_part_in_what_is_left():
+    """Of two stations, as long on the line as each other, chance often strikes one alone three times."""
+    assert blame(master=(100_000, 800), first=(1000, 3), second=(1000, 0)) == {"master": 800, "bus": 3}
+
+
 def test_with_many_senders_one_is_struck_more_than_others_by_chance():
     many = {f"station {number}": (5000, 1) for number in range(16)}
     assert blame(**many, last=(5000, 3)) == {"bus": 19}
