@@ -125,13 +125,16 @@ def _without_overlap(said: RegisterMap) -> list[Mapped]:
 def _names(entries: Sequence[Mapped]) -> list[str]:
     """A name for each that no other has."""
     used: set[str] = set()
+    newest: Counter[str] = Counter()  # the last number behind a name: thousands of entries may be called "reserved"
     names = []
     for entry in entries:
         slug = _NOT_OF_A_NAME.sub("-", entry.title.lower()).strip("-_.+")[:60].rstrip("-_.+")
         wanted = slug or plain_name(entry.space, entry.address).replace("/", "-")
-        name, number = wanted, 2
+        name, number = wanted, max(newest[wanted], 1)
         while name in used:
-            name, number = f"{wanted}-{number}", number + 1
+            number += 1
+            name = f"{wanted}-{number}"
+        newest[wanted] = number
         used.add(name)
         names.append(name)
     return names

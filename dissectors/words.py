@@ -1,4 +1,4 @@
-"""Durations in words, the same everywhere: one precision for lists, one for what is compared with a limit."""
+"""Durations and shares in words, the same everywhere: one precision for lists, one for what is compared with a limit."""
 
 from __future__ import annotations
 
@@ -34,6 +34,14 @@ def duration(value: int) -> str:
 def exact_duration(value: float, unit: int) -> str:
     """A duration in ns as a bare number of units of so many ns, with all its digits: "8.2"."""
     return f"{value / unit:.9f}".rstrip("0").rstrip(".")
+
+
+def percent(share: float, places: int = 1) -> str:
+    """A share, 0 … 1, in percent: some is never told as none, nor what is not all as all ("under 0.1%", "over 99.9%")."""
+    text, step = f"{share:.{places}%}", 10.0 ** -(places + 2)
+    if share > 0 and text == f"{0:.{places}%}":
+        return f"under {step:.{places}%}"
+    return f"over {1 - step:.{places}%}" if share < 1 and text == f"{1:.{places}%}" else text
 
 
 def _three_digits(number: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import sqrt
+from math import floor, log10, sqrt
 
 from dissectors.findings import Severity
 from dissectors.modbus.station_record import Key
@@ -18,6 +18,17 @@ def wilson(count: int, of: int) -> tuple[float, float]:
     middle = (share + z * z / (2 * of)) / (1 + z * z / of)
     half = z * sqrt(share * (1 - share) / of + z * z / (4 * of * of)) / (1 + z * z / of)
     return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def share_words(count: int, of: int) -> str:
+    """The same in percent: "0.2% to 1.6%", with two digits of what is near to none or to all."""
+    low, high = wilson(count, of)
+    near = min(high, 1 - low)
+    places = 1 if near >= _NEAR else 1 - floor(log10(100 * near))
+    return f"{low:.{places}%} to {high:.{places}%}"
+
+
+_NEAR = 0.005
 
 
 def request_words(key: Key) -> str:

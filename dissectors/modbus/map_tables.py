@@ -177,7 +177,8 @@ def _take(found: RegisterMap, rows: Sequence[dict[str, str]], numbering: str, ta
         if entry is not None:
             found.entries.append(entry)
     if unsaid and table is None:
-        found.said.append(f"{unsaid} rows do not say which table; holding registers are taken (--table says another)")
+        what = "1 row does" if unsaid == 1 else f"{unsaid} rows do"
+        found.said.append(f"{what} not say which table; holding registers are taken (--table says another)")
 
 
 def _has_high(numbers: Sequence[_Number]) -> bool:

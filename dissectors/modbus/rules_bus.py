@@ -15,7 +15,7 @@ from dissectors.modbus.odd_ends import OddEnd
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.rules_station import FLAWS, is_absent, of_missing, of_station, wrongly_checked
 from dissectors.modbus.rules_unheard import of_unheard
-from dissectors.words import duration, fine_milliseconds
+from dissectors.words import duration, fine_milliseconds, percent
 
 _WASTE = 0.05
 _HABIT = 10  # a sender that is too quick is so once in so many frames at least; what a computer holds up is rarer
@@ -78,7 +78,7 @@ def _of_bus(seen: BusRecord, is_blamed: bool, scanned: list[int], unheard: list[
     waited = sum(station.waited for station in absent.values())
     if waited and seen.timing.has_times:
         share = waited / seen.span
-        words = f"{share:.0%} of the time ({duration(waited)}) went into waiting for {units(absent)}"
+        words = f"{percent(share, 0)} of the time ({duration(waited)}) went into waiting for {units(absent)}"
         severity = Severity.WARNING if share > _WASTE else None
         yield together(one.missing for one in absent.values()).found(RULES["MB105"], "bus", words, severity)
     broadcast = seen.answers_to_broadcast
@@ -350,7 +350,7 @@ def _common_damage(seen: BusRecord, damage: DamageShare) -> list[Finding]:
     asked = sum(seen.stations[unit].asked for unit in struck)
     answers = damaged - hits.get("master", 0)
     tally = together(seen.stations[unit].damaged for unit in struck)
-    words = f"{answers} of {counted(asked, 'answer')} of {units(struck)} damaged ({answers / max(1, asked):.1%})"
+    words = f"{answers} of {counted(asked, 'answer')} of {units(struck)} damaged ({percent(answers / max(1, asked))})"
     if "master" in hits:
         words += f", and {counted(hits['master'], 'request')}"
     words += (

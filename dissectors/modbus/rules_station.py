@@ -12,13 +12,13 @@ from dissectors.late_speakers import reaching
 from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.exception_meanings import EXCEPTIONS, MAKER_EXCEPTION, USED_ALIKE, VENDOR_EXCEPTION
-from dissectors.modbus.finding_words import note_if, request_words, wilson
+from dissectors.modbus.finding_words import note_if, request_words, share_words
 from dissectors.modbus.functions import EXCEPTIONS as EXCEPTION_NAMES
 from dissectors.modbus.header import code_number
 from dissectors.modbus.response_groups import AnsweredRequest
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.station_record import Key, Requested, StationRecord, middle
-from dissectors.words import duration, fine_milliseconds
+from dissectors.words import duration, fine_milliseconds, percent
 from dissectors.wrong_checks import Habit
 
 SILENT_AT_END = 5
@@ -160,9 +160,8 @@ def _damaged(seen: BusRecord, name: str, station: StationRecord, is_common: bool
         details.append(f"{station.garbled} no frame at all")
     words = f"{damaged.count} of {counted(station.asked, 'answer')} damaged"
     words += f" ({', '.join(details)})" if details else ""
-    low, high = wilson(damaged.count, station.asked)
     if station.asked >= 20:
-        words += f"; that is {low:.1%} to {high:.1%} of all, with 95% confidence"
+        words += f"; that is {share_words(damaged.count, station.asked)} of all, with 95% confidence"
     finding = damaged.found(RULES["MB005"], name, words, note_if(rare or is_common))
     if damaged.count >= _NEARLY_ALL_LEAST and 10 * damaged.count >= 9 * station.asked:  # noise leaves some
         means = f"{finding.means}; or two stations with this address, whose answers fall on each other"
@@ -333,7 +332,7 @@ def _times(
         share = station.repeats_cost / seen.span
         words = (
             f"{counted(station.repeats.count, 'request')} sent again; from one try to the next "
-            f"{duration(station.repeats_cost)} passed in all, {share:.1%} of the time of the bus"
+            f"{duration(station.repeats_cost)} passed in all, {percent(share)} of the time of the bus"
         )
         costly = share > _REPEATS_COST and station.repeats.count >= _REPEATS_LEAST and not is_common
         yield station.repeats.found(RULES["MB104"], name, words, Severity.WARNING if costly else None)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from dissectors.findings import counted
 from dissectors.frame import Check, Damage, Frame, Header, Role
 from dissectors.modbus.envelope import ASCII_NAME, ascii_check, readable_adu, rtu_check
 from dissectors.modbus.functions import DIAGNOSTICS, EXCEPTION_BIT, FUNCTIONS
@@ -241,7 +242,7 @@ def _bits_answer(octets: bytes, short: str) -> str:
 
 def _registers_answer(octets: bytes, short: str) -> str:
     count = octets[2] // 2
-    return _with(f"{count} register{'s' if count != 1 else ''}", _registers(octets[3 : 3 + octets[2]]))
+    return _with(counted(count, "register"), _registers(octets[3 : 3 + octets[2]]))
 
 
 def _status(octets: bytes, short: str) -> str:
@@ -254,7 +255,7 @@ def _event_counter(octets: bytes, short: str) -> str:
 
 
 def _event_log(octets: bytes, short: str) -> str:
-    counts = f"{short}: {_u16(octets, 5)} events, {_u16(octets, 7)} messages"
+    counts = f"{short}: {counted(_u16(octets, 5), 'event')}, {counted(_u16(octets, 7), 'message')}"
     return _with(counts, _hex(octets[9:]))
 
 
