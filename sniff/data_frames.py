@@ -89,6 +89,9 @@ class DataCapture:
         self._capture = capture
         self._columns: TableColumns | None = None
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.path}: {self.session.protocol} {self.session.line}>"
+
     @property
     def started(self) -> int:
         """ns since the epoch; what `show --json` counts its times from."""

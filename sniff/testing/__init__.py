@@ -1,6 +1,6 @@
 """Captures as tests: a pytest plugin, and what it is made of.
 
-    *.cap.txt, *.mcap, *.pcap, *.pcapng  beside  *.expect.txt  →  one test each
+    *.cap.txt, *.mcap, *.pcap, *.pcapng, x.log  beside  *.expect.txt, x.log.expect.txt  →  one test each
 
 Point pytest at the folders that hold captures:
 
@@ -19,11 +19,17 @@ from sniff.testing.naming import EXPECT_SUFFIX, expectation_path
 
 if TYPE_CHECKING:
     from sniff.testing.capture_reading import CaptureReading, read_capture
+    from sniff.testing.crafting import craft
     from sniff.testing.expectation import render
 
-__all__ = ["EXPECT_SUFFIX", "CaptureReading", "expectation_path", "read_capture", "render"]
+__all__ = ["EXPECT_SUFFIX", "CaptureReading", "craft", "expectation_path", "read_capture", "render"]
 
-_LATER = {"CaptureReading": "capture_reading", "read_capture": "capture_reading", "render": "expectation"}
+_LATER = {
+    "CaptureReading": "capture_reading",
+    "read_capture": "capture_reading",
+    "craft": "crafting",
+    "render": "expectation",
+}
 
 
 def __getattr__(name: str) -> Any:  # pytest loads the plugin in every run; the program only where it is used

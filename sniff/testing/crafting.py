@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from inspect import Parameter, signature
 
@@ -19,12 +20,15 @@ def craft(kind: str, **parts: object) -> bytes:
     maker = known.get(kind)
     if maker is None:
         raise ValueError(f"craft {kind!r}: expected one of {', '.join(known)}")
+    takes = ", ".join(_part(part) for part in signature(maker).parameters.values())
     try:
         signature(maker).bind(**parts)
     except TypeError as error:
-        takes = ", ".join(_part(part) for part in signature(maker).parameters.values())
         raise ValueError(f"craft {kind!r}: {error}; its parts are {takes}") from None
-    return maker(**parts)
+    try:
+        return maker(**parts)
+    except (AttributeError, TypeError, ValueError, struct.error, OverflowError) as error:
+        raise ValueError(f"craft {kind!r}: {error}; its parts are {takes}") from error
 
 
 def _part(part: Parameter) -> str:

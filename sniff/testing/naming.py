@@ -17,5 +17,7 @@ def expectation_path(capture: Path) -> Path:
 
 
 def is_capture(path: Path) -> bool:
-    """Whether a file is a capture by its name."""
-    return path.name.endswith(CAPTURE_SUFFIXES)
+    """Whether a file is a capture by its name, or of another kind (a log, a table), of which something is expected."""
+    if path.name.endswith(EXPECT_SUFFIX):
+        return False
+    return path.name.endswith(CAPTURE_SUFFIXES) or expectation_path(path).exists()

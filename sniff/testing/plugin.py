@@ -89,11 +89,15 @@ class CaptureItem(pytest.Item):
             raise CaptureDiffers(said)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """The diff and nothing else."""
+        """The diff and nothing else; of what cannot be read, why."""
         from sniff.engine.capture import CaptureError
 
-        if isinstance(excinfo.value, (CaptureDiffers, CaptureError)):
+        if isinstance(excinfo.value, CaptureDiffers):
             return f"{excinfo.value}\n(accept it with: pytest --sniff-update {self.path})"
+        if isinstance(excinfo.value, CaptureError):
+            return str(excinfo.value)
+        if isinstance(excinfo.value, registry.UnknownProtocol):
+            return f"{self.path}: {excinfo.value}"
         return super().repr_failure(excinfo, style)
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
@@ -111,14 +115,18 @@ def capture(request: pytest.FixtureRequest) -> Callable[[str], CaptureReading]:
 
     def find(name: str) -> CaptureReading:
         from sniff.testing import read_capture
-        from sniff.testing.naming import CAPTURE_SUFFIXES
+        from sniff.testing.naming import CAPTURE_SUFFIXES, is_capture
 
         folders = [request.path.parent, *request.config.getini(INI)]
         for folder in folders:
             for path in [folder / name, *(folder / f"{name}{suffix}" for suffix in CAPTURE_SUFFIXES)]:
                 if path.is_file():
                     return read_capture(path)
-        raise FileNotFoundError(f"capture {name!r}: in none of {', '.join(map(str, folders))}")
+        there = sorted(
+            {path.name for folder in folders if folder.is_dir() for path in folder.iterdir() if is_capture(path)}
+        )
+        known = f"; there are {', '.join(there)}" if there else ""
+        raise FileNotFoundError(f"capture {name!r}: in none of {', '.join(map(str, folders))}{known}")
 
     return find
 

@@ -67,6 +67,7 @@ def test_a_damaged_capture_is_said_without_a_traceback(project: Path, run: Run) 
     assert ran.returncode == 1
     assert "poll.cap.txt:2" in ran.stdout
     assert "Traceback" not in ran.stdout
+    assert "accept it" not in ran.stdout  # there is nothing to accept
 
 
 def test_captures_elsewhere_are_left_alone(project: Path, run: Run) -> None:

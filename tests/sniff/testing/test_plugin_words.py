@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from sniff.testing.crafting import craft, makers
+from sniff.testing import craft, expectation_path, read_capture, render
+from sniff.testing.crafting import makers
+from sniff.testing.naming import is_capture
 from tests.sniff.testing.other_pytest import pytest_command
 
 CAPTURE = "#!sniff-capture 1\n# line: 19200,8E1\n# protocol: modbus-rtu\n+0 01 03 00 00 00 02 C4 0B\n"
@@ -39,6 +41,23 @@ def test_captures_without_expectation_are_said(project: Path) -> None:
     assert "2 passed" in ran
 
 
+def test_a_log_of_which_something_is_expected_is_a_test(project: Path) -> None:
+    """And a protocol that is not known is one line."""
+    log, unknown = project / "captures" / "x.log", project / "captures" / "poll.cap.txt"
+    log.write_text("01 03 00 00 00 02 C4 0B\n")
+    unknown.write_text(CAPTURE.replace("modbus-rtu", "modbus-rt"))
+    expectation_path(unknown).write_text("")
+    assert not is_capture(log)
+    expectation_path(log).write_text(render(read_capture(log)))
+    assert is_capture(log)
+    assert not is_capture(expectation_path(log))
+    ran = pytest_in(project)
+    assert "1 failed, 1 passed" in ran
+    assert "poll.cap.txt: protocol 'modbus-rt' is not installed" in ran
+    assert "Traceback" not in ran
+    assert "def runtest" not in ran
+
+
 def test_many_are_counted(project: Path) -> None:
     for number in range(5):
         (project / "captures" / f"more-{number}.cap.txt").write_text(CAPTURE)
@@ -52,7 +71,7 @@ def test_an_unknown_kind_lists_those_there_are() -> None:
         craft("nix")
 
 
-@pytest.mark.parametrize("parts", [{"station": 1}, {}, {"text": "0A4", "unit": 1}])
+@pytest.mark.parametrize("parts", [{"station": 1}, {}, {"text": "0A4", "unit": 1}, {"text": b"0A4"}])
 def test_wrong_parts_list_the_right_ones(parts: dict[str, object]) -> None:
     with pytest.raises(ValueError, match=r"craft 'n2': .*; its parts are text: str$"):
         craft("n2", **parts)
