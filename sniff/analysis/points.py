@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
+from math import isnan
 from typing import NamedTuple
 
 from dissectors.histogram import Histogram
@@ -89,7 +90,7 @@ class Point:
         """Take a later sample."""
         if self.count:
             self.every.add(sample.time - self.sample.time)
-            if sample.value.value != self.sample.value.value:
+            if _are_different(sample.value.value, self.sample.value.value):
                 self.changed = sample.time
         self.sample = sample
         self.count += 1
@@ -123,7 +124,7 @@ class Point:
         """Take what a later stretch saw of the same point."""
         if later.changed:
             self.changed = later.changed
-        elif later.first[0] != self.sample.value.value:
+        elif _are_different(later.first[0], self.sample.value.value):
             self.changed = later.first[1]
         self.every = self.every.merge(later.every)
         self.every.add(later.first[1] - self.sample.time)
@@ -133,6 +134,11 @@ class Point:
         self.sample = later.sample
         self.count += later.count
         self.history.extend(later.history)
+
+
+def _are_different(one: float | str, other: float | str) -> bool:
+    """Whether a value became another one; what is no number and stays so did not."""
+    return one != other and not (isinstance(one, float) and isinstance(other, float) and isnan(one) and isnan(other))
 
 
 Key = tuple[str, str]
@@ -182,7 +188,7 @@ class PointTable:
             point.first = first
         else:
             point.every.add(first[1] - point.sample.time)
-            if point.sample.value.value != first[0]:
+            if _are_different(point.sample.value.value, first[0]):
                 point.changed = first[1]
         if changed is not None:
             point.changed = changed

@@ -255,7 +255,7 @@ class PointsScreen(TableScreen):
         words.append("→ a command" if point.is_command else "")
         guess = self._guess(point)
         if guess is not None:
-            words.append(guess.words + ("" if guess.value is None else f", so read {guess.value:.7g}"))
+            words.append(guess.words + ("" if guess.value is None else f", so read {number(guess.value)}"))
         words += _seen(point, guess, self.store.session.has_times)
         words.append(f"row {point.sample.frame}")
         return sanitized(" · ".join(word for word in words if word) + f" · {self.said}" + self._more())
@@ -329,6 +329,11 @@ class PointsScreen(TableScreen):
         self.draw()
 
 
+def _brief(value: float) -> str:
+    """Whole numbers with all their digits, others with five."""
+    return number(value) if value.is_integer() else f"{value:.5g}"
+
+
 def _seen(point: Point, guess: GuessedPoint | None, has_times: bool) -> list[str]:
     """How often, how it moved, who wrote it."""
     samples = counted(point.count, "sample")
@@ -340,7 +345,7 @@ def _seen(point: Point, guess: GuessedPoint | None, has_times: bool) -> list[str
     if point.sample.value.words:  # of states and flags the numbers between say nothing
         low = high = rate = None
     if low is not None and high is not None and low != high:
-        words.append(f"seen {low:.7g} … {high:.7g}")
+        words.append(f"seen {number(low)} … {number(high)}")
     if rate and has_times:
         words.append(f"moves {rate:.3g} a second")
     if point.written:
@@ -364,7 +369,7 @@ def _cells(
     shown, low, high = shown_value(value, room), point.low, point.high
     quality = MARKS.get(point.quality, "")
     if guess is not None and guess.value is not None and not guess.is_itself:
-        shown, low, high, quality = f"{guess.value:.7g}", guess.low, guess.high, MARKS[Quality.UNCERTAIN]
+        shown, low, high, quality = number(guess.value), guess.low, guess.high, MARKS[Quality.UNCERTAIN]
     mark = ("^" if _place(point) in pinned else "") + ("→" if point.is_command else "") + quality
     fresh = has_times and bool(point.changed) and now - point.changed <= FRESH
     style = "bold" if fresh else ""
@@ -377,8 +382,8 @@ def _cells(
         Text(str(point.count), justify="right"),
         Text(interval(point.interval if has_times else None), justify="right"),
         Text(jitter(point.jitter, point.interval) if has_times else "–", justify="right"),
-        Text(f"{low:.5g}" if low is not None and is_number else "–", justify="right"),
-        Text(f"{high:.5g}" if high is not None and is_number else "–", justify="right"),
+        Text(_brief(low) if low is not None and is_number else "–", justify="right"),
+        Text(_brief(high) if high is not None and is_number else "–", justify="right"),
         Text(trend([number for _, number in point.history])),
         Text(sanitized(entry.title if entry is not None else guess.words if guess is not None else "")),
     ]

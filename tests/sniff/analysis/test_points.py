@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import importlib.util
+from math import nan
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from dissectors.profiles import Devices
-from dissectors.profiles.decoding import Quality
+from dissectors.profiles.decoding import Quality, decode
 from dissectors.profiles.packaged import packaged
-from dissectors.readings import Origin
+from dissectors.readings import Origin, Reading
 from sniff.analysis.point_reader import PointReader, Sample
 from sniff.analysis.points import Point, PointTable
 from sniff.bus.offline import settled
@@ -172,3 +173,17 @@ def test_a_protocol_without_readings_has_no_points() -> None:
     dissector = replace(dissector_for(Session("x", bus.LINE, "modbus-rtu")), readings=None)
     reader = PointReader(dissector, ALL_E510)
     assert [s for output in bus.run(bus.chunks(READ)) for s in reader.add(output)] == []
+
+
+def test_what_is_no_number_and_stays_so_did_not_change() -> None:
+    def sample(time: int, value: float) -> Sample:
+        return Sample(time, 1, decode(None, [Reading("AI", 1, 0, value, Origin.READ)])[0], time)
+
+    table = PointTable()
+    table.add(sample(time, value) for time, value in enumerate((5.0, nan, float("nan"), nan), 1))
+    (point,) = table
+    assert point.changed == 2
+    later = PointTable()
+    later.add([sample(9, float("nan"))])
+    (point,) = table.merge(later)
+    assert point.changed == 2

@@ -13,13 +13,19 @@ from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from dissectors.modbus.envelope import seal_rtu
 from dissectors.profiles import Devices
+from dissectors.profiles.decoding import decode
 from dissectors.profiles.packaged import packaged
+from dissectors.readings import Origin, Reading
+from sniff.analysis.guessed_points import GuessedPoint
+from sniff.analysis.point_reader import Sample
+from sniff.analysis.points import Point
 from sniff.bus.offline import outputs
 from sniff.bus.rows import Store
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 from sniff.simulation.scenarios import scenario, simulate
+from sniff.tui.screens import points
 from sniff.tui.screens.points import age, trend
 
 STARTED = 1_772_359_200 * 1_000_000_000
@@ -230,3 +236,12 @@ def test_without_the_plotting_library_there_are_bars(look: Any, monkeypatch: pyt
         assert any(bar in see.text() for bar in "▁▂▃▄▅▆▇█")
 
     look(store_of("modbus-rtu", 20), script, start="points")
+
+
+def test_counters_have_all_their_digits() -> None:
+    point = Point(Sample(0, 1, decode(None, [Reading("holding", 0, 1, 4_294_967_295, Origin.READ)])[0], 1))
+    point.reach(0.0, 4_294_967_295.0)
+    guess = GuessedPoint("guessed", 4_294_967_295.0, 4_294_900_001.0, 4_294_967_295.0, 0.0, is_itself=False)
+    told = [cell.plain for cell in points._cells(point, 0, [], guess, 20, True)]
+    assert [told[at] for at in (3, 8, 9)] == ["4294967295", "4294900001", "4294967295"]
+    assert points._seen(point, None, True)[1] == "seen 0 … 4294967295"
