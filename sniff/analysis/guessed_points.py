@@ -65,7 +65,7 @@ class Guessing:
         """By point, for those that the table has."""
         found: dict[Key, GuessedPoint] = {}
         for guess in guessed(covering(self._undescribed()), self.series.written):
-            for key, told in _told(guess, points):
+            for key, told in _told(guess, points, self.series):
                 found[key] = told
         return found
 
@@ -86,7 +86,7 @@ class LatestGuesses:
         if self._of[0] is not series or not self._of[1] <= heard < 1.1 * self._of[1] + 1:
             self._of = series, heard
             self._guesses = list(guessed(covering(series.blocks()), series.written))
-        return {key: told for guess in self._guesses for key, told in _told(guess, points)}
+        return {key: told for guess in self._guesses for key, told in _told(guess, points, series)}
 
 
 def guess_of(point: Point, series: RegisterSeries, points: PointTable) -> GuessedPoint | None:
@@ -102,7 +102,7 @@ def guess_of(point: Point, series: RegisterSeries, points: PointTable) -> Guesse
     ]
     key = sample.station, sample.name
     for guess in guessed(covering(blocks), series.written):
-        for place, one in _told(guess, points):
+        for place, one in _told(guess, points, series):
             if place == key:
                 return replace(one, history=history(guess, blocks))
     return None
@@ -123,7 +123,7 @@ def history(guess: RegisterGuess, blocks: Iterable[RegisterStretch]) -> tuple[tu
     return tuple(sorted(told))
 
 
-def _told(guess: RegisterGuess, points: PointTable) -> Iterable[tuple[Key, GuessedPoint]]:
+def _told(guess: RegisterGuess, points: PointTable, series: RegisterSeries) -> Iterable[tuple[Key, GuessedPoint]]:
     station = station_name(guess.device)
     keys = [(station, plain_name(guess.space, guess.address + step)) for step in range(guess.kind.registers)]
     held = [points.get(*key) for key in keys]
@@ -132,6 +132,8 @@ def _told(guess: RegisterGuess, points: PointTable) -> Iterable[tuple[Key, Guess
     if len(raws) == len(held) and None not in raws:
         row = np.array([[(raw or 0) & 0xFFFF for raw in raws]], np.uint16)
         value = float(read_as(row, guess.kind, guess.swapped, guess.little)[0])
+        if len({point.sample.frame for point in held if point is not None}) > 1:  # words of two moments are no number
+            value = _latest_whole(guess, series)
     words = told(guess)
     for step, (key, point) in enumerate(zip(keys, held, strict=True)):
         whole = len(raws) == len(held)
@@ -142,6 +144,13 @@ def _told(guess: RegisterGuess, points: PointTable) -> Iterable[tuple[Key, Guess
         if itself and point is not None and point.low is not None and point.high is not None:
             low, high, rate = point.low, point.high, point.rate or 0.0  # of every sample, where a guess has some
         yield key, GuessedPoint(words, value, low, high, rate, covered, itself)
+
+
+def _latest_whole(guess: RegisterGuess, series: RegisterSeries) -> float | None:
+    """The latest value of which all registers were answered at once, as far as answers are kept."""
+    blocks = [one for one in series.blocks() if (one.device, one.space) == (guess.device, guess.space)]
+    seen = history(guess, blocks)
+    return seen[-1][1] if seen else None
 
 
 def told(guess: RegisterGuess) -> str:
