@@ -83,11 +83,12 @@ class RowObserver(Remembered):
         self.settle_unfit(no)
 
     def _see_silence(self, gap: int, placement: Placement | None) -> None:
-        """A long silence before a row: what was given up in it as not answered may have been."""
+        """A long silence before a row: what was given up in it as not answered may have been, and nobody waited."""
         asked = self.open
         is_answer = placement is not None and placement.tx == self.newest
         if asked is None or is_answer or not self.silences.note(asked.no, gap):
             return
+        self.open = None
         for tx, lost in list(self.lost.items()):
             if lost.no == asked.no:
                 self.station(lost.unit).withdraw(self.lost.pop(tx))

@@ -291,9 +291,8 @@ class StretchEvidence:
         self._settle(before)
         asked, following = one.asked(before), one.asked(at)
         gap = following.frame.start - asked.frame.end
-        if gap >= SILENCE_LEAST:
-            judge.silences.note(asked.no, gap)
-        judge.waited_in_vain(asked, following)
+        if gap < SILENCE_LEAST or not judge.silences.note(asked.no, gap):
+            judge.waited_in_vain(asked, following)
         judge.settle_request(judge.station(one.unit[before]), one.transaction(before), asked, None, b"")
         self._learn_timeout()
 

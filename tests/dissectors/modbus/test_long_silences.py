@@ -55,3 +55,11 @@ def test_a_master_that_always_pauses_so_long_waits_for_an_answer(paper_bus):
         bus.exchange(read(1), values(1), pause=6_000).exchange(WRITE[0], WRITE[0], pause=6_000)
     bus.say(WRITE[1], 6_000).exchange(read(1), values(1), pause=6_000)
     assert codes(bus) == {("MB002", "station 2")}
+
+
+def test_nobody_waits_for_an_absent_station_while_the_bus_is_off(paper_bus):
+    bus = paper_bus()
+    for silence in (300, 300, 3_600_000, 300):
+        polls(bus).say(read(4)).exchange(read(1), values(1), pause=silence)
+    (waited,) = [one.seen for one in findings_of(polls(bus)) if one.code == "MB105"]
+    assert waited == "under 1% of the time (914 ms) went into waiting for station 4"
