@@ -202,7 +202,7 @@ def error_text(data: bytes, at: int) -> str:
     words = []
     for enumeration in ("ErrorClass", "ErrorCode"):
         tag = tagging.header_at(data, at)
-        if isinstance(tag, str) or tag.context or tag.number != 9:
+        if isinstance(tag, str) or tag.context or tag.number != 9 or not 1 <= tag.end - tag.begin <= 8:
             return "error without class and code"
         words.append(names.name(enumeration, int.from_bytes(data[tag.begin : tag.end], "big")))
         at = tag.end

@@ -86,10 +86,9 @@ def _spans(record: ConstructedValue, writes: bool) -> Iterator[Span]:
 
 
 def _span(thing: ObjectId, record: ConstructedValue, writes: bool) -> Span:
-    space, _, number = str(thing).partition(",")
     which = record.get("property-identifier")
     part = "" if which is None or which.value == PRESENT_VALUE else str(which)
     index = record.get("property-array-index")
     if index is not None:
         part = f"{part or names.name('PropertyIdentifier', PRESENT_VALUE)}.{index}"
-    return Span(space, int(number), 1, part, writes)
+    return Span(thing.kind, thing.instance, 1, part, writes)

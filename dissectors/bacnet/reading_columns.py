@@ -18,9 +18,9 @@ from dissectors.bacnet import message as messages
 from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet.apdu import SEGMENTED, PduType
 from dissectors.bacnet.frame_types import HEADER, FrameType
-from dissectors.bacnet.readings import READ_PROPERTY, TELLING, WRITE_PROPERTY, shortest, told
+from dissectors.bacnet.readings import READ_PROPERTY, TELLING, WRITE_PROPERTY, told
 from dissectors.bacnet.tags import BOOLEAN
-from dissectors.bacnet.values import NUMBER_OF, UNSPECIFIED_INSTANCE
+from dissectors.bacnet.values import NUMBER_OF, UNSPECIFIED_INSTANCE, shortest
 from dissectors.columns import CHECKS, FrameColumns, Masks, Octets, Times
 from dissectors.frame import Check, FoundBy, Frame
 from dissectors.reading_columns import HOWS, Floats, ReadingColumns, ToldValues
@@ -174,7 +174,6 @@ class _Properties:
         fits &= wire.at(at) == _CLOSING
         at = at + 1
         fits &= (at == end) | (may_have_priority & (wire.at(at) == _PRIORITY) & (at + 2 == end))
-        fits &= thing & UNSPECIFIED_INSTANCE != UNSPECIFIED_INSTANCE
         odd = (raw == _NEGATIVE_ZERO) | (raw & _EXPONENT == _EXPONENT)  # or no finite number
         fits &= (tag >> 4 != _REAL) | ~odd
         return cls(fits, thing, which, index, tag, raw)

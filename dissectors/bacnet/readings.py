@@ -13,7 +13,7 @@ from dissectors.bacnet.apdu import PduType
 from dissectors.bacnet.dates import Date, Time
 from dissectors.bacnet.frame_types import HEADER
 from dissectors.bacnet.message import Message
-from dissectors.bacnet.values import BitString, ConstructedValue, Double, Enumerated, ObjectId, show
+from dissectors.bacnet.values import BitString, ConstructedValue, Double, Enumerated, ObjectId, shortest, show
 from dissectors.frame import Frame
 from dissectors.readings import Origin, Reading
 
@@ -64,9 +64,8 @@ def _asked(record: ConstructedValue, station: int) -> Iterator[Reading]:
         pairs = [(spec["object-identifier"], one) for spec in specs for one in spec["list-of-property-references"]]
     for thing, one in pairs:
         if isinstance(thing, ObjectId):
-            space, _, number = str(thing).partition(",")
             part = _part_of(one, one.get("property-array-index"))
-            yield Reading(space, int(number), None, "", Origin.READ, part, station=station)
+            yield Reading(thing.kind, thing.instance, None, "", Origin.READ, part, station=station)
 
 
 def _part_of(record: ConstructedValue, index: int | None) -> str:
@@ -164,12 +163,11 @@ def _parts(record: ConstructedValue, value: Any) -> Iterator[tuple[int | None, A
 def _reading(
     thing: ObjectId, record: ConstructedValue, index: int | None, value: Any, how: Origin, station: int | None
 ) -> Reading | None:
-    space, _, number = str(thing).partition(",")
     part = _part_of(record, index)
     raw, shown = _shown(value)
     if shown is None:
         return None
-    return Reading(space, int(number), raw, shown, how, part, station=station, words=_words(value, shown))
+    return Reading(thing.kind, thing.instance, raw, shown, how, part, station=station, words=_words(value, shown))
 
 
 def _shown(value: Any) -> tuple[int | None, int | float | str | None]:
@@ -196,15 +194,3 @@ def _words(value: Any, shown: int | float | str) -> str:
         words = show(value)
         return "" if words.endswith(str(value.value)) else words
     return shown if isinstance(shown, str) and not isinstance(value, str) else ""
-
-
-def shortest(value: float) -> float:
-    """The shortest decimal that means the same single: 59.9 and not 59.9000015."""
-    for digits in (6, 7, 8):
-        rounded = float(f"{value:.{digits}g}")
-        try:
-            if struct.pack(">f", rounded) == struct.pack(">f", value):
-                return rounded
-        except OverflowError:
-            break
-    return value

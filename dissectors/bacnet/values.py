@@ -57,7 +57,12 @@ class ObjectId:
 
     def __str__(self) -> str:
         instance = "*" if self.instance == UNSPECIFIED_INSTANCE else self.instance
-        return f"{names.object_type(self.type)},{instance}"
+        return f"{self.kind},{instance}"
+
+    @property
+    def kind(self) -> str:
+        """The type by its name."""
+        return names.object_type(self.type)
 
     def pack(self) -> bytes:
         """Four octets."""
@@ -295,7 +300,7 @@ def show(value: Any, depth: int = 0) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
-        return f"{value:.7g}" if type(value) is float else f"{float(value):.16g}"
+        return repr(shortest(value) if type(value) is float else float(value)).removesuffix(".0")
     if isinstance(value, bytes):
         return value.hex() if len(value) <= 32 else f"{value[:32].hex()}… ({len(value)} octets)"
     if isinstance(value, str):
@@ -310,6 +315,18 @@ def show(value: Any, depth: int = 0) -> str:
     if isinstance(value, Tag):
         return show_tag(value)
     return str(value)
+
+
+def shortest(value: float) -> float:
+    """The shortest decimal that means the same single: 59.9 and not 59.9000015."""
+    for digits in (6, 7, 8, 9):
+        rounded = float(f"{value:.{digits}g}")
+        try:
+            if struct.pack(">f", rounded) == struct.pack(">f", value):
+                return rounded
+        except OverflowError:
+            break
+    return value
 
 
 def show_part(name: str, value: Any, depth: int = 0) -> str:

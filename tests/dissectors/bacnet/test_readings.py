@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import struct
 from typing import Any
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -13,8 +15,9 @@ from dissectors.bacnet.application import confirmed
 from dissectors.bacnet.envelope import npdu_frame
 from dissectors.bacnet.f510 import f510
 from dissectors.bacnet.frame_types import FrameType
-from dissectors.bacnet.readings import readings
-from dissectors.bacnet.values import Enumerated
+from dissectors.bacnet.questions import question
+from dissectors.bacnet.readings import asks, readings
+from dissectors.bacnet.values import Double, Enumerated, shortest, show
 from dissectors.frame import Check, FoundBy, Frame
 
 MASTER, DRIVE = 1, 5
@@ -93,3 +96,40 @@ def test_any_octets(request: bytes, response: bytes | None) -> None:
     for kind in (FrameType.DATA_EXPECTING_REPLY, FrameType.DATA_NOT_EXPECTING_REPLY):
         asked = frame(MASTER, DRIVE, b"\x01\x00" + request, kind == FrameType.DATA_EXPECTING_REPLY)
         readings(asked, None if response is None else frame(DRIVE, MASTER, b"\x01\x00" + response))
+
+
+def test_the_device_whoever_it_is() -> None:
+    """4194303 is the instance of a device that is asked by one that does not know its number (clause 15.5)."""
+    asked = frame(MASTER, DRIVE, read("device,*", "object-name"), True)
+    assert [(one.space, one.address, one.part, one.station) for one in asks(asked)] == [
+        ("device", 4194303, "object-name", DRIVE)
+    ]
+    assert [(one.space, one.address, one.part) for one in question(asked).spans] == [("device", 4194303, "object-name")]
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (16777215.0, "16777215"),
+        (12345678.0, "12345678"),
+        (0.1234567, "0.1234567"),
+        (59.9, "59.9"),
+        (-3.0, "-3"),
+        (0.0, "0"),
+        (3.4e38, "3.4e+38"),
+        (1e-7, "1e-07"),
+        (float("inf"), "inf"),
+        (Double(123456789.123), "123456789.123"),
+        (Double(0.1), "0.1"),
+        (Double(2.0**53), "9007199254740992"),
+    ],
+)
+def test_a_number_is_shown_with_all_its_digits(value: float, shown: str) -> None:
+    single = value if isinstance(value, Double) else struct.unpack(">f", struct.pack(">f", value))[0]
+    assert show(single) == shown
+
+
+@given(st.floats(width=32, allow_nan=False))
+def test_the_shortest_decimal_means_the_same_single(single: float) -> None:
+    assert struct.pack(">f", shortest(single)) == struct.pack(">f", single)
+    assert len(repr(shortest(single)).split("e")[0].strip("-").replace(".", "").strip("0")) <= 9
