@@ -65,7 +65,7 @@ class BulkBusWatch(BusWatch):
         self._last = max(self._last, int(frames.end[first : last + 1].max()))
         self._heard, self._slack = int(frames.end[last]), int(rows.slack[last])
         silent = request[units.poll[which] & ~units.answered[which]]
-        self._wasted += int(np.maximum(frames.start[silent + 1] - frames.end[silent], 0).sum())
+        self._wasted += int(np.clip(frames.start[silent + 1] - frames.end[silent], 0, self._slot).sum())
         self._count(units, which)
         self._pass_tokens(rows, units, which)
         self._exchange(rows, units, which)

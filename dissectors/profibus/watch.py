@@ -27,6 +27,9 @@ _KEPT_ROUNDS = 10
 """Times the longest round of the token so far, for which no master has reason to keep it."""
 
 _ROUNDS_LEAST = 8
+LONGEST_SLOT = 16_383
+"""Bit times of the longest slot time that a master can be given (14 bits): no longer does it wait for an answer."""
+
 _LEAST_CLAIM = 6 * 37
 """Bit times of silence after which the lowest master makes a new token: six slot times, of 37 bits at least."""
 
@@ -116,6 +119,7 @@ class BusWatch:
         self._heard = self._slack = 0  # end of the row before, and by how much it may have been earlier
         self._timing = timing
         self._least_claim = timing.line.bits(_LEAST_CLAIM)
+        self._slot = timing.line.bits(LONGEST_SLOT)
         self._holder: int | None = None
         self._interruption: _Interruption | None = None  # until it is known whether a token was missed at this tap
         self._robbed: int | None = None  # who lost the token to another one that gave it up; until it speaks in turn
@@ -344,6 +348,6 @@ class BusWatch:
             return
         (asked, service, end), self._asked = self._asked, None
         if service is Service.FDL_STATUS:
-            self._wasted += max(0, time - end)
+            self._wasted += min(max(0, time - end), self._slot)
         elif asked.destination is not None:
             self.slaves.setdefault(asked.destination, SlaveView()).missed(time)

@@ -148,3 +148,19 @@ def test_a_slave_is_offline_after_four_requests_that_nothing_answers() -> None:
         assert judge.ring().slaves[5].state is state, count
     back = judged([*exchanges(4), *lost * 4, *exchanges(1)])
     assert back.ring().slaves[5].state is SlaveState.EXCHANGE
+
+
+def test_a_poll_before_a_long_silence_took_no_more_than_its_slot() -> None:
+    """Who polls waits for a slot time, 87 ms at most at this rate; an hour of silence behind it is nobody's poll."""
+    poll = telegram(9, 1, 0x49)
+    ring = judged([*exchanges(2), (1, poll), *exchanges(2, wait=3_600_000)]).ring()
+    assert ring.wasted == LINE.bits(16_383)
+    assert 80 * MS < ring.wasted < 90 * MS
+
+
+def test_a_watchdog_of_no_time_is_none_that_a_master_can_be_late_for() -> None:
+    none = [(1, telegram(5, 1, 0x5D, bytes((0x88, 0, 1, 11, 0xF5, 0x10, 0)), 61, 62)), (1, bytes((SC,)))]
+    left = [(1, telegram(5, 1, 0x7D, b"\0")), (1, telegram(1, 5, 0x03))]
+    judge = judged([*diagnosis(), *none, *exchanges(6), *left])
+    assert found(judge, "PB019") is None
+    assert found(judge, "PB007") is not None
