@@ -1,4 +1,4 @@
-"""Durations and shares in words, the same everywhere: one precision for lists, one for what is compared with a limit."""
+"""Durations and shares in words, the same everywhere: in lists, and where they are compared with a limit."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def exact_duration(value: float, unit: int) -> str:
 
 
 def percent(share: float, places: int = 1) -> str:
-    """A share, 0 … 1, in percent: some is never told as none, nor what is not all as all ("under 0.1%", "over 99.9%")."""
+    """A share, 0 … 1, in percent; some is not told as none ("under 0.1%"), nor nearly all as all ("over 99.9%")."""
     text, step = f"{share:.{places}%}", 10.0 ** -(places + 2)
     if share > 0 and text == f"{0:.{places}%}":
         return f"under {step:.{places}%}"

@@ -9,12 +9,12 @@ from typing import Final
 
 from dissectors.findings import Finding, Severity, Tally, counted
 from dissectors.frame import Chunk, Noise
+from dissectors.words import percent
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, other_protocol
 from sniff.analysis.sender_findings import BUS
 from sniff.analysis.slower_bus import slower_by
 from sniff.analysis.stray_findings import INSTEAD, INSTEAD_LEAST
-from sniff.analysis.wording import percent
 from sniff.engine.session import Session
 
 MOST_KEPT: Final = 16

@@ -76,13 +76,6 @@ def _short(value: int) -> str:
     return f"{ms:.0f}" if ms >= 10 or ms == int(ms) else f"{ms:.1f}" if ms >= 0.1 else f"{ms:.2f}"
 
 
-def percent(share: float) -> str:
-    """A share of what can be counted: "12.3%"; a few are not none, and nearly all not all."""
-    if 0 < share < 0.0005:
-        return "under 0.1%"
-    return "over 99.9%" if 0.9995 <= share < 1 else f"{share:.1%}"
-
-
 def is_error(row: Row) -> bool:
     """Whether a row itself is trouble: noise, or a frame that is not good. What a search heard is neither."""
     return row.searched is None and (not isinstance(row.event, Frame) or not row.event.ok)

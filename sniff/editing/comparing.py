@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from dissectors.findings import Finding, Severity, counted
 from dissectors.profiles.decoding import number
 from dissectors.tracker import Verdict
-from dissectors.words import milliseconds
+from dissectors.words import milliseconds, percent
 from sniff.analysis.nodes import Node
 from sniff.analysis.point_reader import ALL
 from sniff.analysis.points import Point
 from sniff.analysis.summary import Summary
-from sniff.analysis.wording import percent
 
 NOTICEABLE = 0.02
 """A share has changed when it moved by as much; a time when it moved by a tenth and more than the adapters allow."""

@@ -40,7 +40,16 @@ AT_ONCE = 1 << 18
 _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _UNITS = {"": 1, "K": 1000, "M": 1_000_000, "G": 1_000_000_000}
 _RATE = re.compile(r"\s*(\d{1,12}(?:\.\d{1,9})?)\s*([kKMG]?)(?:Hz)?\s*")
-_DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, OverflowError)
+_DAMAGED = (
+    zipfile.BadZipFile,
+    zlib.error,
+    EOFError,
+    OSError,
+    NotImplementedError,
+    RuntimeError,
+    ValueError,
+    OverflowError,
+)
 
 
 class SigrokSession:

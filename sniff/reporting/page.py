@@ -9,7 +9,7 @@ from typing import Any
 
 from dissectors.line import MS
 from dissectors.tracker import Verdict
-from dissectors.words import bare_milliseconds
+from dissectors.words import bare_milliseconds, percent
 from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.wording import station_word
 from sniff.reporting.numbers import CaptureNumbers
@@ -46,7 +46,7 @@ def page(reports: Sequence[CaptureNumbers]) -> str:
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=harmless
     )
-    environment.filters |= {"ms": _ms, "number": _number, "percent": _percent, "seconds": _seconds, "span": _span,
+    environment.filters |= {"ms": _ms, "number": _number, "percent": percent, "seconds": _seconds, "span": _span,
                             "verdict": _verdict, "damage": _damage}  # fmt: skip
     template = environment.from_string(resources.files(__package__).joinpath(TEMPLATE).read_text("utf-8"))
     sections = [
@@ -108,10 +108,6 @@ def _number(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.2f}" if abs(value) < 100 else f"{value:.0f}"
     return f"{value:,}".replace(",", NARROW) if isinstance(value, int) else str(value)
-
-
-def _percent(share: float) -> str:
-    return f"{share:.1%}"
 
 
 def _seconds(value: float | None) -> str:

@@ -289,6 +289,16 @@ def test_a_description_as_large_as_a_house_is_not_unpacked(tmp_path: Path) -> No
         read(path)
 
 
+def test_a_zip_whose_directory_says_that_it_is_elsewhere_is_refused(tmp_path: Path) -> None:
+    path, _ = _made(tmp_path, "sr")
+    octets = path.read_bytes()
+    at = octets.rfind(b"PK\x05\x06") + 12
+    for size, offset in ((len(octets), 0), (10, 0), (0, len(octets)), (10, 0xFFFF_FFFF), (0xFFFF, 7)):
+        path.write_bytes(octets[:at] + size.to_bytes(4, "little") + offset.to_bytes(4, "little") + octets[at + 8 :])
+        with pytest.raises(CaptureError):
+            read(path)
+
+
 def test_other_zips_are_refused_with_a_way_out(tmp_path: Path) -> None:
     for name, words in (("header", "DSView"), ("hello.txt", "no sigrok session")):
         path = tmp_path / "other.sr"
