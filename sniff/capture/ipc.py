@@ -147,6 +147,7 @@ _MARK = struct.Struct("<IB")
 _TICK = struct.Struct("<q")
 _LINE = struct.Struct("<qqB")
 _DERIVED = struct.Struct("<qqHHI")
+_I64 = 1 << 63
 _LINE_KINDS = tuple(LineEventKind)
 _LINE_CODES = {kind: code for code, kind in enumerate(_LINE_KINDS)}
 
@@ -161,19 +162,20 @@ def encode_item(bus: int, item: Item) -> bytes:
     if isinstance(item, Chunk):
         if not item.marks:
             octets = item.octets
-            return _FRAME.pack(len(octets) + 12, IpcKind.CHUNK, bus) + _CHUNK.pack(item.time, 0) + octets
+            return _FRAME.pack(len(octets) + 12, IpcKind.CHUNK, bus) + _CHUNK.pack(_in_64_bits(item.time), 0) + octets
         marks = item.marks[:0xFFFF]
-        body = _CHUNK.pack(item.time, len(marks))
+        body = _CHUNK.pack(_in_64_bits(item.time), len(marks))
         body += b"".join(_MARK.pack(mark.offset, mark.error.value) for mark in marks)
         return encode(IpcKind.CHUNK, bus, body + item.octets)
     text = item.text.encode("utf-8", "replace")
-    return encode(IpcKind.LINE, bus, _LINE.pack(item.time, item.count, _LINE_CODES[item.kind]) + text)
+    head = _LINE.pack(_in_64_bits(item.time), _in_64_bits(item.count), _LINE_CODES[item.kind])
+    return encode(IpcKind.LINE, bus, head + text)
 
 
 def encode_reads(bus: int, chunks: Sequence[Chunk]) -> bytes:
     """Reads that hold octets and no marks, at least one: u32 n, i64 time[n], u32 length[n], the octets."""
     count = len(chunks)
-    times = struct.pack(f"<{count}q", *[chunk.time for chunk in chunks])
+    times = struct.pack(f"<{count}q", *[_in_64_bits(chunk.time) for chunk in chunks])
     lengths = struct.pack(f"<{count}I", *[len(chunk.octets) for chunk in chunks])
     return encode(
         IpcKind.READS, bus, b"".join((_COUNT.pack(count), times, lengths, *[chunk.octets for chunk in chunks]))
@@ -200,7 +202,12 @@ def octets_in(kind: int, body: bytes) -> tuple[int, int]:
 
 def encode_tick(bus: int, now: int) -> bytes:
     """A Tick."""
-    return encode(IpcKind.TICK, bus, _TICK.pack(now))
+    return encode(IpcKind.TICK, bus, _TICK.pack(_in_64_bits(now)))
+
+
+def _in_64_bits(number: int) -> int:
+    """A number as near as 64 bits come: a file that is played may hold any."""
+    return number if -_I64 <= number < _I64 else min(max(number, -_I64), _I64 - 1)
 
 
 def encode_json(kind: IpcKind, value: Any, bus: int = 0) -> bytes:

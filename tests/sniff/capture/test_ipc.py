@@ -55,6 +55,20 @@ def test_text_that_is_no_unicode_crosses() -> None:
     assert decode_message(*message) == ReceivedMessage(0, LineEvent(1, LineEventKind.NOTE, "?"))
 
 
+@pytest.mark.parametrize(("far", "near"), [(1 << 63, (1 << 63) - 1), (-(1 << 64), -(1 << 63))])
+def test_numbers_beyond_64_bits_of_a_file_that_is_played_cross_as_near_as_may_be(far, near) -> None:
+    sent = [
+        LineEvent(far, LineEventKind.ERRORS, "parity", far),
+        Chunk(far, b"a"),
+        Chunk(far, b"a", (Mark(0, LineError.PARITY),)),
+    ]
+    stream = b"".join(encode_item(0, item) for item in sent) + encode_reads(0, [Chunk(far, b"a")]) + encode_tick(0, far)
+    event, *chunks, tick = one_by_one(decode_message(*message) for message in MessageSplitter().feed(stream))
+    assert event.item == LineEvent(near, LineEventKind.ERRORS, "parity", near)
+    assert [chunk.item.time for chunk in chunks] == [near] * 3
+    assert tick == Tick(0, near)
+
+
 def test_the_other_messages() -> None:
     status = Status(3, "night.mcap", 10, 20, 30, 40, "normal", "disk full")
     stream = encode_tick(2, -5) + encode_status(status) + ipc.encode_ended("stopped", at_end=False)
