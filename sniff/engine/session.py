@@ -45,6 +45,9 @@ class Adapter:
         return self.driver in LINELESS or self.name in LINELESS
 
 
+MOST_LATENCY = 3600 * NS_PER_S
+"""ns that a file may say an adapter holds octets back: more means no more, and is reckoned with in 64 bits."""
+
 LINELESS = frozenset(("pty", "TCP gateway"))
 """Drivers and adapters that set no line."""
 
@@ -218,7 +221,7 @@ class Session:
             adapter=Adapter(
                 name=record.get("adapter", "unknown"),
                 driver=record.get("adapter_driver", ""),
-                latency=max(0, _integer(record.get("adapter_latency_ns"))),
+                latency=min(max(0, _integer(record.get("adapter_latency_ns"))), MOST_LATENCY),
                 latency_from=record.get("adapter_latency_from", "assumed"),
                 reports=None if reports == "unknown" else tuple(name for name in reports.split(",") if name),
                 detail=record.get("adapter_detail", ""),

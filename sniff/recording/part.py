@@ -15,7 +15,7 @@ from typing import BinaryIO
 
 from sniff.engine.session import Session
 from sniff.recording.chunk_indices import ChunkIndices
-from sniff.recording.topic_message import Message
+from sniff.recording.topic_message import Message, stamp
 from sniff.recording.topics import (
     BUS,
     FIXED_CHANNELS,
@@ -99,7 +99,7 @@ class PartFile:
 
     def _attach_profiles(self, sessions: Sequence[Session]) -> None:
         documents = {name: document for session in sessions for name, document in session.profiles.items()}
-        started = sessions[0].started
+        started = stamp(sessions[0].started)
         for name, document in documents.items():
             self._writer.add_attachment(started, started, name + PROFILE_SUFFIX, PROFILE_MEDIA_TYPE, document.encode())
 

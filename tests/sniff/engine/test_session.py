@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from dissectors.line import LineSettings
@@ -29,3 +30,10 @@ def test_why_a_port_went_is_read_back_as_it_was_said() -> None:
     event = LineEvent(1, LineEventKind.UNPLUGGED, gone("/dev/a (b)", "no such device (19)"))
     assert gone_why(event) == "no such device (19)"
     assert gone_why(LineEvent(1, LineEventKind.UNPLUGGED, "simulated")) == "simulated"
+
+
+def test_a_latency_that_no_adapter_has_is_reckoned_with_all_the_same() -> None:
+    said = SESSION.to_metadata() | {"adapter_latency_ns": "9" * 30}
+    session = Session.from_metadata(said)
+    late = np.array([session.adapter.latency], np.int64) + session.adapter.latency
+    assert late[0] == 2 * session.adapter.latency > 0

@@ -16,6 +16,7 @@ from sniff.devices import devices, noted, noted_devices, with_devices
 from sniff.engine.capture import Capture
 from sniff.engine.session import DEVICES_NOTE
 from sniff.formats import read
+from sniff.recording.mcap_writer import create
 from sniff.recording.reader import MOST_PROFILE
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
@@ -120,3 +121,12 @@ def test_a_hostile_attachment_is_no_device(tmp_path: Path, profiles: Mapping[str
     assert noted(found.session) == ({}, (f"1={name}",)), why
     assert list(found.items()) == list(capture.items())
     assert main(["points", str(tmp_path / "hostile.mcap")]) == 0
+
+
+@pytest.mark.parametrize("started", [-(10**18), 10**40])
+def test_a_start_that_no_attachment_can_have_keeps_them_all_the_same(tmp_path: Path, started: int) -> None:
+    session = replace(read(CAPTURE).session, started=started, profiles={"pump": PUMP})
+    with create(tmp_path / "old.mcap", session):
+        pass
+    found = read(tmp_path / "old.mcap").session
+    assert (found.started, dict(found.profiles)) == (started, {"pump": PUMP})
