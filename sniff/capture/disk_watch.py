@@ -40,6 +40,12 @@ class DiskWatch:
         said = f"{gone} octets lost" if gone else "nothing lost"
         return f"the disk has caught up: it was {_seconds(worst)} behind, {said}"
 
+    def excuse(self, lost: int) -> None:
+        """What is behind now has a reason that is said elsewhere: no jam begins, and none is over for that."""
+        self.behind = 0
+        if not self._worst:
+            self._lost = lost
+
     def _jam(self, now: int, late: int, behind: int, lost: int) -> str | None:
         self._worst = max(self._worst, late)
         recent = self._told_at is not None and 0 <= now - self._told_at < AGAIN

@@ -50,3 +50,14 @@ def test_a_card_that_is_always_slow_is_not_told_again_and_again() -> None:
         text = watch.see(second * S, 0, syncing * S, 0)
         told += [second] if text and text.startswith("disk slow") else []
     assert len(told) <= 2 + 2 * (300 * S // AGAIN)
+
+
+def test_what_has_another_reason_neither_begins_a_jam_nor_ends_one() -> None:
+    """A full disk is said as such; that nothing is looked at meanwhile is not that the disk has caught up."""
+    watch = DiskWatch()
+    watch.excuse(100)
+    assert watch.see(S, 3 * S, 0, 100) == "disk slow: 3 s behind"
+    watch.excuse(400)
+    assert watch.behind == 0
+    assert watch.see(3 * S, 5 * S, 0, 400) is None
+    assert watch.see(4 * S, 0, 0, 400) == "the disk has caught up: it was 5 s behind, 300 octets lost"
