@@ -287,7 +287,7 @@ class CaptureLoop:
             self.outlet.droppable(encode_tick(bus.index, bus.source.now()))
         if news or now >= self._status_at:
             self._status_at = now + STATUS_EVERY
-            self._check_clock(now)
+            self._check_clock()
             self._send_status()
         self.outlet.flush()
         busy = now < self._busy_until or self.outlet.size
@@ -315,22 +315,24 @@ class CaptureLoop:
             # trouble is said, and explains that nothing is written; so does that nobody ran
             runs = self._runs.runs_since(now)
             explained = recorder.trouble is not None or (runs is not None and runs < SLOW)
-            behind, syncing = (0, 0) if explained else (recorder.behind(now), recorder.syncing)
-            slow = watch.see(now, behind, syncing, recorder.lost_octets)
+            slow = None
+            if explained:
+                watch.excuse(recorder.lost_octets)
+            else:
+                slow = watch.see(now, recorder.behind(now), recorder.syncing, recorder.lost_octets)
             for text in told + ([slow] if slow is not None else []):
                 news = True
                 self._keep(index, LineEvent(self._buses[index].source.now(), LineEventKind.NOTE, text))
         return news
 
-    def _check_clock(self, now: int) -> None:
+    def _check_clock(self) -> None:
         offset = self.clock.drift()
         if abs(offset - self._offset) > STEP:
             self._offset = offset
             off = f"{offset / MS:+.3f} ms" if abs(offset) < NS_PER_S else f"{offset / NS_PER_S:+.3f} s"
             text = f"wall clock is {off} from the capture's"
             for bus in self._buses:
-                event = LineEvent(now, LineEventKind.CLOCK, text, offset)
-                self._keep(bus.index, event)
+                self._keep(bus.index, LineEvent(bus.source.now(), LineEventKind.CLOCK, text, offset))
 
     def _send_status(self) -> None:
         for bus in self._buses:
@@ -418,7 +420,7 @@ class CaptureLoop:
             try:
                 source.reconfigure(LineSettings.parse(line))
             except (PortError, ValueError) as error:
-                self._keep(bus, LineEvent(self.clock.now(), LineEventKind.REFUSED, refusal(line, str(error))))
+                self._keep(bus, LineEvent(source.now(), LineEventKind.REFUSED, refusal(line, str(error))))
             self._take(self._buses[bus])
 
     def _mark(self, bus: int, what: LineEventKind, time: int, text: str) -> None:

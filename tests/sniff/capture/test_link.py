@@ -308,11 +308,11 @@ def test_a_clock_step_is_told(monkeypatch) -> None:
         monkeypatch.setattr("sniff.capture.loop.IDLE_BEAT", 0)
         step = loop._check_clock
 
-        def until_all_are_taken(now):
-            step(now)
+        def until_all_are_taken():
+            step()
             if not Stepping.steps:
                 loop.stop("enough")
-                monkeypatch.setattr(loop, "_check_clock", lambda now: None)
+                monkeypatch.setattr(loop, "_check_clock", lambda: None)
 
         monkeypatch.setattr(loop, "_check_clock", until_all_are_taken)
         loop.run()
@@ -321,3 +321,4 @@ def test_a_clock_step_is_told(monkeypatch) -> None:
         (LineEventKind.CLOCK, 1_500_000),
         (LineEventKind.CLOCK, -3_000_000_000),
     ]
+    assert {event.time for event in kept} == {Silent().now()}, "a capture that is played has times of its own"
