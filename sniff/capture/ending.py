@@ -37,8 +37,16 @@ def in_words(code: int | None, said: bytes) -> str:
     if code is None:
         return "capture process does not answer"
     last = said.decode("utf-8", "replace").strip().splitlines()[-1:]
-    how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
+    how = f"was ended by {_signal_name(-code)}" if code < 0 else f"ended with code {code}"
     return f"capture process {how}" + "".join(f": {line}" for line in last)
+
+
+def _signal_name(number: int) -> str:
+    """Most real-time signals have none."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
 
 
 def _code_of_held(pid: int) -> int | None:

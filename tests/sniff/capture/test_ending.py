@@ -95,3 +95,8 @@ def test_how_it_ended_in_words() -> None:
     assert in_words(-9, b"") == "capture process was ended by SIGKILL"
     assert in_words(1, b"Traceback\nValueError: no\n") == "capture process ended with code 1: ValueError: no"
     assert in_words(None, b"") == "capture process does not answer"
+
+
+def test_any_signal_has_a_name() -> None:
+    assert in_words(-9, b"") == "capture process was ended by SIGKILL"
+    assert in_words(-40, b"") == "capture process was ended by signal 40"
