@@ -34,7 +34,7 @@ class IpcSender:
         self.gathered = 0
         self._reads: list[list[Chunk]] = [[] for _ in range(buses)]  # that are no message yet
         self._unsealed = [0] * buses  # octets that they will take
-        self._gap = [0] * buses  # octets dropped since the last that were sent
+        self._gap: list[int | None] = [None] * buses  # octets dropped since the last that were sent; None: nothing was
         self.dropped = [0] * buses
         connection.setblocking(False)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, AT_ONCE)
@@ -54,13 +54,14 @@ class IpcSender:
         if self._connection is None:
             return
         octets = item.octets if isinstance(item, Chunk) else b""
-        if self._size > self._backlog or (self._gap[bus] and self._size > self._backlog // 2):
-            self._gap[bus] += max(1, len(octets))
+        gap = self._gap[bus]
+        if self._size > self._backlog or (gap is not None and self._size > self._backlog // 2):
+            self._gap[bus] = (gap or 0) + len(octets)
             self.dropped[bus] += len(octets)
             return
-        if self._gap[bus]:
-            self.post(encode_item(bus, gap_event(item.time, self._gap[bus])))
-            self._gap[bus] = 0
+        if gap is not None:
+            self.post(encode_item(bus, gap_event(item.time, gap)))
+            self._gap[bus] = None
         if isinstance(item, Chunk) and octets and not item.marks:
             taken = len(octets) + A_READ
             self._reads[bus].append(item)

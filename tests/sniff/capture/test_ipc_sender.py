@@ -90,3 +90,17 @@ def test_of_a_long_backlog_only_what_is_sent_at_once_is_joined(pair, monkeypatch
             assert outlet.gathered == 0
     assert outlet.size > 10 * max(joined)
     assert max(joined) <= 2 * AT_ONCE
+
+
+def test_events_that_were_dropped_are_no_octets(pair) -> None:
+    here, there = pair
+    outlet = IpcSender(here, 1, backlog=1000)
+    outlet.item(0, Chunk(1, bytes(2000)))
+    for number in range(3):
+        outlet.item(0, LineEvent(2 + number, LineEventKind.NOTE, "something"))
+    outlet.flush()
+    outlet.item(0, Chunk(9, b"after"))
+    outlet.flush()
+    _, gap, after = (message.item for message in receive(there))
+    assert (gap.kind, gap.count, after) == (LineEventKind.DROPPED, 0, Chunk(9, b"after"))
+    assert outlet.dropped == [0]
