@@ -33,6 +33,7 @@ class TriggerRing:
         self._waiting: deque[Item] = deque()
         self._size = 0
         self._gap = 0  # octets left out since the last that was kept
+        self._is_full = False  # some of them although a trigger might still have asked for them
         self._until: int | None = None  # all is kept up to then
         self._kept = 0  # time of the newest that was
         self._left = 0  # of the newest that was not
@@ -45,6 +46,7 @@ class TriggerRing:
         self._waiting.append(item)
         self._size += _weight(item)
         while self._waiting and (self._waiting[0].time < item.time - self._before - LATE or self._size > MOST):
+            self._is_full = self._is_full or self._waiting[0].time >= item.time - self._before - LATE
             self._let_go(self._waiting.popleft())
 
     def fire(self, time: int, text: str) -> None:
@@ -96,10 +98,11 @@ class TriggerRing:
 
     def _say_gap(self, time: int | None) -> None:
         if self._gap:
-            text = f"{self._gap} octets not kept: no trigger fired"
+            why = "more came before a trigger than memory holds" if self._is_full else "no trigger fired"
+            text = f"{self._gap} octets not kept: {why}"
             at = self._left if time is None else time
             self.recorder.line(LineEvent(at, LineEventKind.OMITTED, text, self._gap))
-            self._gap = 0
+            self._gap, self._is_full = 0, False
 
 
 def _weight(item: Item) -> int:

@@ -123,3 +123,11 @@ def test_a_recording_tells_what_was_left_out(tmp_path: Path) -> None:
     items = list(McapCapture(tmp_path / "a.mcap").items())
     assert [item.octets for item in items if isinstance(item, Chunk)] == [chunk(one).octets for one in (9, 10, 11)]
     assert [item.kind.value for item in items if isinstance(item, LineEvent)] == ["omitted", "trigger", "omitted"]
+
+
+def test_what_memory_does_not_hold_is_not_said_to_be_unwanted(monkeypatch) -> None:
+    monkeypatch.setattr(trigger_ring, "MOST", 1100)
+    kept, _ = run(60, 1, [(second, second == 50) for second in range(60)])
+    said = [item.text for item in kept.items if isinstance(item, LineEvent) and item.kind is LineEventKind.OMITTED]
+    assert "more came before a trigger than memory holds" in said[0]
+    assert "no trigger fired" in said[1]
