@@ -62,10 +62,11 @@ class CaptureFileSource:
         return None if self._next is None or self._closed else self._due(self._next)
 
     def now(self) -> int:
-        """The time of the file that has been reached."""
-        if self._speed is None or self.ended:
+        """The time of the file that has been reached: never beyond what is still to be given."""
+        if self._speed is None or self._next is None or self._closed:
             return self._now
-        return max(self._now, self._first + int((self._clock.now() - self._began) * self._speed))
+        paced = self._first + int((self._clock.now() - self._began) * self._speed)
+        return max(self._now, min(paced, self._next.time - 1))
 
     def read(self) -> list[Item]:
         """What is due, at most some hundred items."""

@@ -106,3 +106,18 @@ def test_a_damaged_file_ends_where_it_is_damaged(path, clock):
     assert last.kind is LineEventKind.NOTE
     assert "poll.cap.txt:8:5: expected" in last.text
     assert source.ended
+
+
+def test_its_time_is_never_beyond_what_is_still_to_be_given(tmp_path, clock) -> None:
+    """A tick of a time promises that all before it was given."""
+    path = tmp_path / "busy.cap.txt"
+    path.write_text(TEXT + "+0.1 01\n" * 2 * AT_ONCE)
+    source = CaptureFileSource(str(path), clock)
+    FakeClock.time += 10_000_000_000
+    given = []
+    while items := source.read():
+        assert items[0].time > (given[-1].time if given else 0)
+        given += items
+        following = source._next
+        assert given[-1].time <= source.now() < (following.time if following else source.now() + 1)
+    assert len(given) == 3 + 2 * AT_ONCE
