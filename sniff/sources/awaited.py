@@ -9,19 +9,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from dissectors.line import MS, NS_PER_S, LineSettings
+from dissectors.line import NS_PER_S, LineSettings
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, gone
 from sniff.sources import PortError, Source
 from sniff.sources.clock import Clock
+from sniff.sources.drivers import UNKNOWN
+from sniff.sources.gateway import LATENCY as NETWORK_LATENCY
 from sniff.sources.reconnecting import Reconnecting
 
 RETRY_EVERY = 2 * NS_PER_S
 
 ABSENT = Adapter(
-    latency=17 * MS,
+    latency=UNKNOWN.hold,
     latency_from="assumed: the port was not there when the recording began",
     detail="the port was not there when the recording began: nobody knows what errors its adapter reports",
 )
+ABSENT_GATEWAY = replace(ABSENT, latency=NETWORK_LATENCY)
 
 Open = Callable[[str, LineSettings, Clock], Source]
 
@@ -46,7 +49,9 @@ class AwaitedSource:
             self._source = open_source(spec, line, clock)
         except (PortError, OSError, ValueError) as error:
             self._pending.append(self._gone(_reason(spec, error)))
-        self._adapter = ABSENT if self._source is None else self._source.session_adapter
+        absent = ABSENT_GATEWAY if "://" in spec else ABSENT
+        self._adapter = absent if self._source is None else self._source.session_adapter
+        self._is_new = self._source is None  # nobody has seen its adapter
 
     @property
     def session_adapter(self) -> Adapter:
@@ -122,9 +127,9 @@ class AwaitedSource:
             return []
         self._source = source
         name = source.session_adapter.name
-        text = f"{self.spec} is back" + (f": {name}" if self._adapter is ABSENT else "")
-        if self._adapter is ABSENT:
-            self._adapter = replace(ABSENT, name=name)
+        text = f"{self.spec} is back" + (f": {name}" if self._is_new else "")
+        if self._is_new:
+            self._adapter, self._is_new = replace(self._adapter, name=name), False
         return [LineEvent(self._clock.now(), LineEventKind.REPLUGGED, text)]
 
 

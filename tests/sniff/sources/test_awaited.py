@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import pytest
+
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, gone
 from sniff.sources import PortError
 from sniff.sources.awaited import RETRY_EVERY, AwaitedSource
 from sniff.sources.clock import Clock
+from sniff.sources.drivers import UNKNOWN
+from sniff.sources.gateway import LATENCY
 
 LINE = LineSettings.parse("19200,8E1")
 
@@ -120,3 +124,11 @@ def test_a_port_that_is_there_is_as_it_is() -> None:
     assert source.session_adapter == Port.session_adapter
     assert source.fileno() == 7
     assert source.read() == []
+
+
+@pytest.mark.parametrize(
+    ("spec", "slowest"), [("/dev/x", UNKNOWN.hold), ("socket://gate:4001", LATENCY), ("rfc2217://gate:4001", LATENCY)]
+)
+def test_one_that_is_not_there_is_as_slow_as_any_of_its_kind(spec, slowest) -> None:
+    source = AwaitedSource(spec, LINE, Hand(), Socket().open)  # type: ignore[arg-type]
+    assert source.session_adapter.latency >= slowest
