@@ -54,6 +54,9 @@ MOST_PROFILE = 1 << 20
 """Octets of an attached device profile; a longer one is passed over."""
 MOST_PROFILES = 64
 
+MOST_BUSES = 256
+"""In one file: as many as a capture can have."""
+
 
 def read(path: str | Path) -> McapCapture | SeveralBuses:
     """Open a recording, of one bus or of several. Raises CaptureError."""
@@ -359,6 +362,8 @@ class McapCapture:
             return False
         if found.name == SESSION_RECORD:
             session = Session.from_metadata(found.metadata)
+            if len(self.sessions) >= MOST_BUSES:
+                raise CaptureError(f"{self.path}: over {MOST_BUSES} buses in it; no recording of sniff485 has as many")
             self.sessions.append(session)
             if len(self.sessions) == self.bus + 1:
                 self.session = replace(session, profiles=self.session.profiles)

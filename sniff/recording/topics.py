@@ -211,7 +211,9 @@ def topics_of(buses: Sequence[str]) -> list[dict[str, str]]:
     names: list[str] = []
     for number, bus in enumerate(buses, 1):
         name = topic_part(bus) or "bus"
-        names.append(f"{name}-{number}" if name in names else name)
+        while name in names:
+            name = f"{name}-{number}"
+        names.append(name)
     return [{topic: f"{topic}/{name}" for topic, _ in FIXED_CHANNELS} for name in names]
 
 

@@ -15,7 +15,7 @@ from sniff.engine.session import Item, LineEvent, LineEventKind, Session, Settin
 from sniff.recording import scan
 from sniff.recording.reader import McapCapture
 from sniff.recording.rotation import Rotation
-from sniff.recording.topics import VALUE_SCHEMA, topics_of
+from sniff.recording.topics import RAW, VALUE_SCHEMA, topics_of
 from sniff.recording.writer import Recorder, SharedFile
 from tests.sniff.recording.test_recorder import eventually
 
@@ -180,3 +180,10 @@ def test_values_of_a_bus_stand_beside_its_reads(tmp_path: Path) -> None:
 )
 def test_topics_say_which_bus(buses: list[str], raw: list[str]) -> None:
     assert [own["/raw"] for own in topics_of(buses)] == raw
+
+
+def test_buses_never_share_a_topic() -> None:
+    """A number that tells a name from its like may be another's name."""
+    names = [topics[RAW] for topics in topics_of(["a", "a-3", "a!", "a-3", "a"])]
+    assert len(set(names)) == len(names)
+    assert topics_of(["a", "b", "a"])[2][RAW] == "/raw/a-3"
