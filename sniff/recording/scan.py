@@ -125,6 +125,14 @@ def records(stream: BinaryIO, report: Report, since: int | None = None, start: i
             report.end = position
             _end_of_data(stream, length, check if whole else None, report)
             return
+        if length > MOST_RECORD:
+            if opcode in (CHUNK, MESSAGE):
+                too_long = f"record at octet {position}: {length} octets; more than {MOST_RECORD} are not read"
+                report.problem(too_long, length)
+            whole = False
+            position = stream.seek(length, 1)
+            report.end = position
+            continue
         body, last_time = _body(stream, opcode, length, since)
         whole = whole and body is not None
         if whole and body is not None:
@@ -158,13 +166,10 @@ def records_at(stream: BinaryIO, report: Report, places: Sequence[int]) -> Itera
 
 
 def _body(stream: BinaryIO, opcode: int, length: int, since: int | None) -> tuple[bytes | None, int | None]:
-    """A record's content, None where it is too long or earlier than `since`; the last time in a sound chunk.
+    """A record's content, None where it is earlier than `since`; the last time in a sound chunk.
 
     A sound chunk is one whose sizes agree.
     """
-    if length > MOST_RECORD:
-        stream.seek(length, 1)
-        return None, None
     if opcode != CHUNK:
         return stream.read(length), None
     start = stream.read(min(length, _CHUNK_START))

@@ -20,7 +20,7 @@ from sniff.formats import read
 from sniff.recording import scan
 from sniff.recording.batcher import Batcher
 from sniff.recording.part import PartFile
-from sniff.recording.reader import McapCapture
+from sniff.recording.reader import MOST_BUSES, McapCapture
 from sniff.recording.topic_message import Message
 from tests.seeds import IS_SEARCH
 
@@ -381,3 +381,34 @@ def read_from(path: Path, since: int) -> list[Item]:
     capture = opened(path)
     assert capture is not None
     return list(capture.items(since))
+
+
+def test_a_chunk_that_is_too_long_to_be_read_is_a_hole_and_told(
+    small: tuple[bytes, list[Item], list[int]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    octets, items, _ = small
+    path = tmp_path / "long.mcap"
+    path.write_bytes(octets)
+    lengths = [len(record.body or b"") for record in records_of(path) if record.opcode == scan.CHUNK]
+    monkeypatch.setattr(scan, "MOST_RECORD", sorted(lengths)[-2])
+    longest = max(lengths)
+    capture = McapCapture(path)
+    read_again = [item for item in capture.items() if isinstance(item, Chunk)]
+    assert 0 < len(read_again) < sum(isinstance(item, Chunk) for item in items)
+    told = capture.completeness()
+    assert not told.whole
+    assert f"{longest} octets; more than" in told.text
+    assert any(isinstance(item, LineEvent) and item.count == -1 for item in capture.items()) or lengths[-1] == longest
+
+
+def records_of(path: Path) -> list[scan.Record]:
+    with path.open("rb") as stream:
+        return list(scan.records(stream, scan.Report(path.stat().st_size)))
+
+
+def test_more_buses_than_there_can_be_are_refused_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "many.mcap"
+    with path.open("wb") as stream:
+        PartFile(stream, [SESSION] * (MOST_BUSES + 1)).finish()
+    with pytest.raises(CaptureError, match=f"over {MOST_BUSES} buses"):
+        read(path)
