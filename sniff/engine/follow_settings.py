@@ -45,7 +45,7 @@ class SessionEngine:
         self.searching = bool(session.unknown)
         self._in_force = self._before = session.line
         self._since: int | None = None  # when the present attempt began, None before the first octet
-        self._held: list[Chunk] = []
+        self._held: list[Item] = []  # reads, and the holes between them
         self._held_octets = 0
         self.engine = Engine(registry.get(session.protocol), session.timing, first, before_tx, pairing)
 
@@ -59,7 +59,11 @@ class SessionEngine:
         if isinstance(item, Chunk):
             return self.feed(item)
         if item.kind.is_hole:  # what was asked before it and what is answered after it belong to nothing
-            return NOTHING if self.searching and not self._counts_anyhow else self._restart(self.engine.timing)
+            if not self.searching or self._counts_anyhow:
+                return self._restart(self.engine.timing)
+            if self._held and isinstance(self._held[-1], Chunk):
+                self._held.append(item)
+            return NOTHING
         change = settings_change(item)
         return NOTHING if change is None else self._change(change, item.time)
 
@@ -110,7 +114,9 @@ class SessionEngine:
         if (line, protocol) == (self.engine.timing.line, self.engine.dissector.name):
             return NOTHING
         self._in_force = line
-        timing = Timing(line, self.session.adapter.latency, has_times=self.session.timing.has_times)
+        timing = replace(self.session.timing, line=line)
+        if change.line is not None:
+            timing = replace(timing, has_rate=True)
         return self._restart(timing, protocol)
 
     def _find(self, change: SettingsChange) -> Output:
@@ -122,10 +128,12 @@ class SessionEngine:
         held = self._let_go()
         if self._since is not None:  # what the adapter still held was heard with the settings before
             until = self._since + self.session.adapter.latency
-            late = next((number for number, chunk in enumerate(held) if chunk.time > until), len(held))
+            late = next((number for number, heard in enumerate(held) if heard.time > until), len(held))
             outputs.append(self._only_heard(held[:late], self._before))
             held = held[late:]
-        outputs += [self.engine.feed(chunk) for chunk in held]
+        for heard in held:
+            again = self.engine.feed(heard) if isinstance(heard, Chunk) else self._restart(self.engine.timing)
+            outputs.append(again)
         return together(outputs)
 
     def _restart(self, timing: Timing, protocol: str | None = None) -> Output:
@@ -136,14 +144,16 @@ class SessionEngine:
         self.engine = Engine(dissector, timing, before.next, before.last_tx, self._pairing)
         return output
 
-    def _let_go(self) -> list[Chunk]:
+    def _let_go(self) -> list[Item]:
         held, self._held, self._held_octets = self._held, [], 0
         return held
 
-    def _only_heard(self, chunks: list[Chunk], line: LineSettings) -> Output:
+    def _only_heard(self, heard: list[Item], line: LineSettings) -> Output:
         """Rows of a search: octets, when, and with which settings."""
         rows = []
-        for chunk in chunks:
+        for chunk in heard:
+            if not isinstance(chunk, Chunk):
+                continue
             start = chunk.time - len(chunk.octets) * line.char
             noise = Noise(chunk.octets, start, chunk.time, Place.BETWEEN, Reason.NO_FRAME, chunk.marks)
             rows.append(Row(self.engine.next, noise, searched=line))

@@ -19,6 +19,7 @@ from sniff.engine import follow_settings
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import SessionEngine
 from sniff.engine.session import (
+    ASSUMED,
     UNKNOWABLE,
     Adapter,
     Item,
@@ -223,3 +224,26 @@ def test_no_request_is_paired_across_a_hole() -> None:
             Verdict.ANSWERED,
         ]
         assert [row.no for row in rows_of(items, FOUND)] == list(range(1, 7))
+
+
+@pytest.mark.parametrize("hole", [LineEventKind.DROPPED, LineEventKind.UNPLUGGED])
+def test_a_hole_in_what_was_held_parts_what_stands_round_it(hole) -> None:
+    """The request before it and the answer behind it belong to nothing, as where nobody searched."""
+    items = searched()
+    at = next(place for place, item in enumerate(items) if isinstance(item, Chunk) and item.octets == ANSWER)
+    items.insert(at, LineEvent(items[at].time - 1, hole, "lost", 8))
+    engine = SessionEngine(OPEN)
+    made = [engine.take(item) for item in items] + [engine.close()]
+    verdicts = [one.verdict for output in made for one in output.transactions]
+    assert verdicts.count(Verdict.ANSWERED) == 2
+    assert len([row for output in made for row in output.rows]) == 8
+
+
+def test_a_change_of_the_line_does_not_make_an_unknown_adapter_exact() -> None:
+    unnamed = Session("port", FIRST, "modbus-rtu", adapter=Adapter(), notes={"line": ASSUMED})
+    engine = SessionEngine(unnamed)
+    assert not engine.engine.timing.is_told
+    engine.take(settings(1, protocol="n2"))
+    assert (engine.engine.timing.is_told, engine.engine.timing.has_rate) == (False, False)
+    engine.take(settings(2, line=RIGHT))
+    assert (engine.engine.timing.is_told, engine.engine.timing.has_rate) == (False, True)
