@@ -289,14 +289,12 @@ def test_a_description_as_large_as_a_house_is_not_unpacked(tmp_path: Path) -> No
         read(path)
 
 
-def test_a_zip_whose_directory_says_that_it_is_elsewhere_is_refused(tmp_path: Path) -> None:
+def test_a_zip_that_lacks_octets_in_its_middle_is_refused(tmp_path: Path) -> None:
     path, _ = _made(tmp_path, "sr")
     octets = path.read_bytes()
-    at = octets.rfind(b"PK\x05\x06") + 12
-    for size, offset in ((len(octets), 0), (10, 0), (0, len(octets)), (10, 0xFFFF_FFFF), (0xFFFF, 7)):
-        path.write_bytes(octets[:at] + size.to_bytes(4, "little") + offset.to_bytes(4, "little") + octets[at + 8 :])
-        with pytest.raises(CaptureError):
-            read(path)
+    path.write_bytes(octets[:60] + octets[101:])  # what its directory names begins before the file does
+    with pytest.raises(CaptureError, match="damaged"):
+        read(path)
 
 
 def test_other_zips_are_refused_with_a_way_out(tmp_path: Path) -> None:
