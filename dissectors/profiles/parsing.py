@@ -14,6 +14,7 @@ from dissectors.profiles.model import Access, Bit, BitField, Entry, EntryRole, K
 
 REGISTER_TABLES = ("holding", "input")
 BIT_TABLES = ("coil", "discrete")
+_FAMILIES = ("modbus", "n2", "bacnet", "profibus")
 N2_REGIONS = ("AI", "BI", "AO", "BO", "ADF", "ADI", "BD")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
 
@@ -24,14 +25,17 @@ def parse(data: Mapping[str, Any], origin: str) -> Profile:
     name = _name(top, "name")
     modbus, n2, bacnet = top.table("modbus"), top.table("n2"), top.table("bacnet")
     profibus = top.table("profibus")
+    others = [top.table(word) for word in top.texts("protocols") if word in top and word not in _FAMILIES]  # plug-ins'
     registers, absent = _modbus(modbus)
     exceptions = {"modbus": modbus.words("exceptions"), "n2": n2.words("errors")}
+    exceptions |= {other.path: other.words("errors") for other in others}
     objects = [_object(table, _n2_place(table), n2=True) for table in n2.tables("object")]
     objects += [_object(table, _bacnet_place(table)) for table in bacnet.tables("object")]
     objects += [_entry(table, *_word_place(table), None) for table in profibus.tables("word")]
+    objects += [_object(table, _any_place(table)) for other in others for table in other.tables("object")]
     facts = _constants(profibus.table("device"))
     times = response_times({key.lower(): value for key, value in facts.items() if isinstance(value, int)})
-    limits = {family.path: _limits(family.table("limits")) for family in (modbus, n2, bacnet, profibus)}
+    limits = {family.path: _limits(family.table("limits")) for family in (modbus, n2, bacnet, profibus, *others)}
     profile = Profile(
         name=name,
         title=top.text("title"),
@@ -52,7 +56,7 @@ def parse(data: Mapping[str, Any], origin: str) -> Profile:
         source=top.text("source", ""),
         origin=origin,
     )
-    for table in (top, modbus, n2, bacnet, profibus):
+    for table in (top, modbus, n2, bacnet, profibus, *others):
         table.finish()
     _check(profile)
     return profile
@@ -153,6 +157,14 @@ def _bacnet_place(table: CheckedTable) -> tuple[str, int]:
     space, _, number = table.text("object").partition(" ")
     if not re.fullmatch(r"[a-z][a-z-]*", space) or not _is_number(number, 0x3FFFFF):
         raise table.error("object", 'expected "analog-input 0": object type and instance')
+    return space, int(number)
+
+
+def _any_place(table: CheckedTable) -> tuple[str, int]:
+    """A place as the readings of a plug-in have it: their space, and the address in it."""
+    space, _, number = table.text("object").rpartition(" ")
+    if not space or not number.isdigit():
+        raise table.error("object", 'expected "counter 7": what the plug-in calls the kind of thing, and its number')
     return space, int(number)
 
 

@@ -89,6 +89,21 @@ octet-order = "low-first"
     assert profile.at("holding", 1) is a
 
 
+GONG = 'name = "bell"\ntitle = "A bell"\nprotocols = ["gong"]\n[[gong.object]]\nobject = "place 7"\nname = "level"\n'
+
+
+def test_objects_of_a_plug_in_stand_under_its_name() -> None:
+    bell = parse_text(f'{GONG}unit = "m"\nscale = 0.1\n[gong.limits]\nframe = 13\n[gong.errors]\n3 = "cracked"\n', "x")
+    entry = bell.at("place", 7)
+    assert entry is not None
+    assert (entry.name, entry.unit, entry.scale, entry.number) == ("level", "m", 0.1, "place 7")
+    assert bell.limits_on("gong").frame == 13
+    assert bell.exception("gong", 3) == "cracked"
+    for wrong in (GONG.replace("[[gong", "[[going"), GONG.replace("place 7", "place"), GONG + "colour = 3\n"):
+        with pytest.raises(ProfileError):
+            parse_text(wrong, "x")
+
+
 def test_a_group_of_parameters() -> None:
     profile = pump(
         '[[modbus.parameters]]\nprefix = "P."\nbase = 0x100\npresent = "0-2 9"\nabsent = "3"\n'
