@@ -50,7 +50,7 @@ LATEST = (
     "changed s",
     "samples",
     "every ms",
-    "± ms",
+    "jitter ms",
     "low",
     "high",
     "a second",
@@ -62,7 +62,7 @@ _SELDOM = ("unit", "written")
 FRESH = 2.0
 """Seconds for which a change is marked on a terminal."""
 
-OF_TIME = frozenset(("time", "age s", "changed s", "every ms", "± ms", "a second"))
+OF_TIME = frozenset(("time", "age s", "changed s", "every ms", "jitter ms", "a second"))
 """Columns that a capture without times does not know."""
 
 SAMPLES = ("time", "device", "point", "value", "raw", "unit", "quality", "how", "frame", "means")

@@ -24,7 +24,7 @@ HEADINGS = (
     "request",
     "asks",
     "every ms",
-    "± ms",
+    "jitter ms",
     "asked",
     "answered",
     "exceptions",

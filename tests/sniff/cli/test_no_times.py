@@ -118,14 +118,14 @@ def test_nothing_is_said_of_gaps_that_nobody_measured(log: Path, sniff485: Run) 
 
 def test_values_have_no_ages(log: Path, sniff485: Run) -> None:
     latest = [json.loads(line) for line in sniff485("points", "--latest", "--json", log).out.splitlines()]
-    assert {
-        one[name] for one in latest for name in ("age_s", "changed_s", "every_ms", "plus_minus_ms", "per_second")
-    } == {None}
+    assert {one[name] for one in latest for name in ("age_s", "changed_s", "every_ms", "jitter_ms", "per_second")} == {
+        None
+    }
     assert {one["samples"] for one in latest} == {8}
     every = [json.loads(line) for line in sniff485("points", "--json", log).out.splitlines()]
     assert {one["time"] for one in every} == {None}
     polls = [json.loads(line) for line in sniff485("stats", "polls", "--json", log).out.splitlines()]
-    assert {one[name] for one in polls for name in ("every_ms", "plus_minus_ms", "first", "last")} == {None}
+    assert {one[name] for one in polls for name in ("every_ms", "jitter_ms", "first", "last")} == {None}
 
 
 def test_info_has_no_span_and_no_load(log: Path, sniff485: Run) -> None:
