@@ -21,6 +21,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `diff`."""
     parser.add_argument("before", metavar="BEFORE", help="capture")
     parser.add_argument("after", metavar="AFTER", help="capture")
+    arguments.add_bus(parser)
     arguments.add_devices(parser)
     arguments.add_reference(parser)
     filtering.add_filter(parser, "only what matches, and exchanges with a frame that does")

@@ -32,10 +32,10 @@ def run(args: argparse.Namespace) -> int:
 
     differing = 0
     for name in args.files:
-        arguments.say_assumed(arguments.open_capture(name).session, name)
         path = Path(name)
-        place = expectation_path(path)
-        found = render(_of_filter(args, read_capture(path)))
+        place, reading = expectation_path(path), read_capture(path)
+        arguments.say_assumed(arguments.open_capture(name).session, name)
+        found = render(_of_filter(args, reading))
         try:
             expected = place.read_text(encoding="utf-8") if place.exists() else ""
             if not args.check and expected != found:

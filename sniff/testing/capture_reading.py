@@ -18,11 +18,13 @@ from sniff.analysis.told_protocol import detected
 from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
 from sniff.devices import noted, noted_devices
+from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Completeness, LineEvent, Session
 from sniff.engine.verdict_join import JudgedRow
 from sniff.formats import read
+from sniff.formats.several_buses import SeveralBuses
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +65,11 @@ def read_capture(path: str | Path, said: Devices | None = None) -> CaptureReadin
     """Read a capture whole. `said`: devices, before those that it names. Raises CaptureError, UnknownProtocol."""
     place = Path(path)
     capture = read(place)
+    if isinstance(capture, SeveralBuses):
+        raise CaptureError(
+            f"{place}: {len(capture.buses)} buses in it ({capture.listed}), and a test is of one; take it out: "
+            f"sniff485 convert {place.name} NAME.mcap --bus NAME"
+        )
     session = capture.session = detected(capture.session)
     dissector = dissector_for(session)
     known, unknown = noted(session)

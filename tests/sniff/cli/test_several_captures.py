@@ -94,3 +94,13 @@ def test_an_empty_name_chooses_the_only_bus(site: Path, sniff485: Run) -> None:
     ran = sniff485("show", "--bus=", site)
     assert (ran.code, ran.out) == (3, "")
     assert "2 buses in it" in ran.err
+
+
+def test_a_test_is_of_one_bus_and_two_captures_are_compared_by_bus(site: Path, sniff485: Run) -> None:
+    ran = sniff485("snapshot", site)
+    assert ran.code == 3
+    assert (
+        "(roof, cellar), and a test is of one; take it out: sniff485 convert site.mcap NAME.mcap --bus NAME" in ran.err
+    )
+    assert sniff485("diff", site, site).code == 2
+    assert sniff485("diff", site, site, "--bus", "roof").code == 0
