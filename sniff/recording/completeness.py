@@ -16,7 +16,7 @@ def completeness_of(one: MessagePass, joiner: Joiner) -> Completeness:
         when = f"last chunk read at {iso(one.last)}" if one.last is not None else "no chunk in it"
         said.append(f"cut at octet {report.end} of {report.size}, or still being written; {when}")
         if report.size > report.end:
-            said.append(f"{report.size - report.end} octets after it lost")
+            said.append(f"{report.size - report.end} octets of the file behind that cannot be read")
     said.extend(report.problems)
     if report.places > len(report.problems):
         said.append(f"{report.places - len(report.problems)} more such places")
