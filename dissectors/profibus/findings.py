@@ -9,6 +9,7 @@ from dataclasses import replace
 from dissectors.findings import Finding, Severity, Tally, counted, times
 from dissectors.frame import Event, Frame, Header, Role
 from dissectors.line import NS_PER_S, Timing
+from dissectors.profibus.blame import ONE_STATION, SentOctets
 from dissectors.profibus.configuration import parse_configuration
 from dissectors.profibus.diagnosis import CONFIGURATION_FAULT, PARAMETER_FAULT
 from dissectors.profibus.record import RequestsRecord, joined
@@ -33,7 +34,6 @@ _LEAST_FRESH = 2
 _ONE_SILENCE = NS_PER_S // 2
 """Slaves that leave within that time left in the same silence of their master."""
 
-_ONE_STATION = 0.9
 _TOLERANCE = 5
 """Bit times by which a measured answer time may be off."""
 
@@ -56,6 +56,7 @@ class ProfibusFindings:
         self._damaged = Tally()
         self._bad: dict[int, Frame] = {}  # the newest of them by row
         self._frames = 0
+        self.sent = SentOctets()
         self._passed: dict[int, int] = defaultdict(int)  # tokens to each master
         self._told: dict[int, int] = defaultdict(int)  # tokens and requests from each master
 
@@ -63,6 +64,8 @@ class ProfibusFindings:
         """Take the next row."""
         if isinstance(event, Frame):
             self._frames += 1
+            if header is None or header.role is not Role.TOKEN:
+                self.sent.see(event, placement)
             if not event.ok:
                 self._damaged.add(event.start, no)
                 self._bad[no] = event
@@ -290,8 +293,8 @@ class ProfibusFindings:
         is_one = (
             worst is not None
             and others
-            and answers[worst].count >= max(_LEAST, _ONE_STATION * total)
-            and answers[worst].count >= _ONE_STATION * damaged.count
+            and answers[worst].count >= max(_LEAST, ONE_STATION * total)
+            and self.sent.is_its_own(worst, answers[worst].count, damaged.count)
         )
         if is_one and worst is not None:
             asked = self.records[worst].requests

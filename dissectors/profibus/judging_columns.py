@@ -62,8 +62,17 @@ class _Judging:
         passed = np.bincount(units.destination[which][token], minlength=1)
         told = np.bincount(units.source[which], minlength=1)
         self._judge.count_rows(count, _counts(passed), _counts(told))
+        self._count_octets(which)
         self._judge.watch.pass_by(self._rows, units, begin, end)
         self._settle(begin + np.flatnonzero(units.exchange[which]))
+
+    def _count_octets(self, which: slice) -> None:
+        units, lengths = self._units, self._rows.frames.length
+        request, last, answered = units.request[which], units.last[which], units.answered[which]
+        tokens = lengths[request[units.token[which]]]
+        total = int(lengths[request[0] : last[-1] + 1].sum()) - int(tokens.sum())
+        answers = np.bincount(units.destination[which][answered], lengths[last[answered]], minlength=1)
+        self._judge.sent.count(total, _counts(answers))
 
     def _settle(self, asked: Times) -> None:
         """What became of data exchange, by station; polls only pass by."""
