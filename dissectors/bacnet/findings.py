@@ -9,10 +9,11 @@ from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_hearing import TRUSTED, hearing, takes_unheard, unheard_share
 from dissectors.bacnet.findings_of_refusals import REFUSED_KEPT, Refusals
+from dissectors.bacnet.findings_of_skipping import skipped
 from dissectors.bacnet.findings_of_tokens import silences, tokens
 from dissectors.bacnet.findings_of_use import polls, use
-from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
-from dissectors.bacnet.ring import COARSE_LIMIT, Ring, RingNode, lies_between
+from dissectors.bacnet.limits import MAX_MASTER, T_REPLY_DELAY, T_USAGE_DELAY
+from dissectors.bacnet.ring import COARSE_LIMIT, Ring, RingNode
 from dissectors.bacnet.ring_events import Happened, RingEventKind
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.bacnet.ring_window import MstpRingWindow
@@ -43,9 +44,6 @@ often than after other tokens."""
 POSTPONED_SHARE = 0.1
 LEAST_USES = 20
 FOR_OTHERS_LEAST = 3
-SKIPPED_ROUNDS = 20
-"""So many tokens past a station that is in the ring, and not one poll to it, are no accident."""
-
 _ANSWERED = frozenset((Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION))
 
 _SIMPLE: tuple[tuple[str, RingEventKind, int, str], ...] = (
@@ -113,18 +111,8 @@ def _under_causes(made: list[Remark]) -> Iterable[Finding]:
 
 def _holders(ring: Ring) -> Iterable[Remark]:
     """Those who are kept from the token, and those who speak without one."""
+    yield from skipped(ring)
     for mac, node in ring.nodes.items():
-        skipped = _skipped_by(ring, mac, node)
-        if skipped is not None:
-            by, following, rounds = skipped
-            polled = sorted(address for source, address in ring.polled if source == by)
-            first = "" if ring.first is None else f" {(node.last_token - ring.first) / 1e9:.2f} s into the capture"
-            seen = (
-                f"got its last token{first}; since then {rounds} rounds without a token or a poll for it: "
-                f"MAC {by} passes the token on to MAC {following} and polls "
-                f"{f'only {listed(polled)}' if polled else 'nobody'}, never {_between(by, following)}"
-            )
-            yield plain("MS110", ring, mac, seen, rounds)
         unasked = ring.of(RingEventKind.UNASKED, mac)
         if unasked.count and not (node.is_master and mac <= MAX_MASTER) and ring.shows_tokens:
             why = "an address above 127 can have no token" if mac > MAX_MASTER else "it never gets a token"
@@ -138,35 +126,6 @@ def _for_others(ring: Ring) -> Iterable[Remark]:
         if what is RingEventKind.FOR_ANOTHER:
             seen = f"answered {times(happened.count)} what MAC {listed(happened.parties)} was asked"
             yield of("MS306", mac, seen, happened, Severity.NOTE if happened.count < FOR_OTHERS_LEAST else None)
-
-
-def _skipped_by(ring: Ring, mac: int, node: RingNode) -> tuple[int, int, int] | None:
-    """Who passes the token past a station that was in the ring: (who, to whom, how often).
-
-    It missed no token, or is heard while the token goes past it and nobody polls it.
-    """
-    used = node.tokens_sent and node.tokens_received and node.last > node.last_token > ring.hole
-    if not used or node.last_polled > node.last_token or mac > MAX_MASTER:
-        return None
-    for (by, following), edge in ring.edges.items():
-        past = lies_between(mac, by, following) and edge.since > node.last_token and edge.streak >= SKIPPED_ROUNDS
-        if not past or any(source == by and other.last > edge.last for (source, _), other in ring.edges.items()):
-            continue
-        beyond = any(
-            source == by and time > node.last_token and (lies_between(address, mac, following) or address == following)
-            for (source, address), time in ring.polled.items()
-        )
-        alive = node.last > edge.since  # heard, while the token goes past it
-        polled = sum(source == by and time > node.last_token for (source, _), time in ring.polled.items())
-        went_round = edge.streak >= N_POLL * (polled + 2)  # by now it has polled all that it ever polls, this one not
-        if (alive and went_round) or not beyond:  # else it looked for a successor, and may have lost this one before
-            return by, following, edge.streak
-    return None
-
-
-def _between(by: int, following: int) -> str:
-    first, last = (by + 1) % (MAX_MASTER + 1), (following - 1) % (MAX_MASTER + 1)
-    return str(first) if first == last else f"{first} … {last}"
 
 
 def _least_share(ring: Ring) -> float:

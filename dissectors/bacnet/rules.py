@@ -112,6 +112,16 @@ _ALL = (
         explains=("MS301",),
     ),
     Rule(
+        "MS112",
+        Severity.ERROR,
+        "passes the token past others",
+        "One station passes the token past two and more that are shut out of the ring (MS110) by that.",
+        "its Max_Master is lower than its own address, so that it looks for its successor too low; or it does not look "
+        "for it at all",
+        "Max_Master and firmware of that station; switch it off and see whether the others are in the ring again",
+        explains=("MS110",),
+    ),
+    Rule(
         "MS111",
         Severity.WARNING,
         "sent without being asked",

@@ -127,6 +127,15 @@ def test_a_station_past_which_the_token_goes():
     assert "MAC 3 passes the token on to MAC 0 and polls nobody, never 4 … 127" in read.of("MS110").seen
 
 
+def test_several_stations_past_which_one_passes_the_token_are_its_doing():
+    last: list[Step] = [(2, token(0, 3)), (2, token(3, 5)), (2, token(5, 9))]
+    read = script([*rounds(10, 0, 3, 5, 9), *last, (2, token(9, 5)), *rounds(60, 5, 9)])
+    assert read.graves() == {("MS112", "MAC 9")}
+    assert "on to MAC 5, past MAC 0, 3," in read.of("MS112").seen
+    under = {one.subject for one in read.findings if one.cause == ("MS112", "MAC 9")}
+    assert under == {"MAC 0", "MAC 3"}
+
+
 def test_a_station_that_was_looked_for_is_not_shut_out():
     """It may have been switched off just then; or its poll was damaged."""
     search: list[Step] = [(2 if address == 4 else 25, poll(3, address)) for address in (*range(4, 11), 0)]
