@@ -124,6 +124,7 @@ class BusWatch:
         self._interruption: _Interruption | None = None  # until it is known whether a token was missed at this tap
         self._robbed: int | None = None  # who lost the token to another one that gave it up; until it speaks in turn
         self.claimed_from: Counter[int] = Counter()  # who had the tokens that others then made anew
+        self._gone: set[int] = set()  # who did not take its last token, and was not heard since
         self._newest = b""  # the newest request, while no token or other request came after it
         self._longest_clear: dict[int, int] = {}
         self._token: tuple[int, int] | None = None  # source and destination of the last token, nothing after it
@@ -172,7 +173,8 @@ class BusWatch:
         if holder is None or holder.got is None or not self._newest or not self._timing.has_times:
             return None
         usual, time = holder.rotation.quantile(1), self._last - holder.got
-        others = tuple(at for at, one in sorted(self._masters.items()) if one.view.tokens and one is not holder)
+        there = (at for at in sorted(self._masters) if at not in self._gone and at != self._holder)
+        others = tuple(at for at in there if self._masters[at].view.tokens)
         if usual is None or holder.rotation.count < _ROUNDS_LEAST or not others or self._holder is None:
             return None
         is_long = time > max(NS_PER_S, _KEPT_ROUNDS * usual)
@@ -234,6 +236,7 @@ class BusWatch:
             claims=giver.view.claims + (is_claim and was_in_ring),
         )
         if is_again:
+            self._gone.add(to)
             self._tell(Notice.TOKEN_AGAIN, to, no, frame.start)
         elif is_claim and was_in_ring:
             self.claimed_from[self._holder or 0] += 1
@@ -269,6 +272,7 @@ class BusWatch:
 
     def _goes_on(self, source: int) -> None:
         """A master speaks: had it never given the token away, who spoke meanwhile did not have it."""
+        self._gone.discard(source)
         cut = self._interruption
         if cut is not None and cut.holder == source:
             self._tell(Notice.OUT_OF_TURN, cut.by, cut.no, cut.time)

@@ -31,6 +31,7 @@ def test_a_master_that_asks_on_and_passes_no_token_is_told() -> None:
         [*turn(1, 1) * 20, *ASKS_ON],
         [*ROUNDS, *ASKS_ON[:60]],  # not for so long
         [*ROUNDS, (1, b"\xdc\x00"), *ASKS_ON],  # perhaps a token
+        [*ROUNDS, *turn(1, 2), (1, token(2, 1)), (1, token(2, 1)), *turn(1, 1), *ASKS_ON],  # the other one is gone
     ],
 )
 def test_others_keep_none(heard: Telegrams) -> None:
