@@ -77,7 +77,7 @@ class LineFindings:
         """`dissector`: that of the session, where it is in no registry."""
         self._session = session
         self._patterns = TimePatterns(session)
-        self._use = LineUse(session.line, has_times=session.timing.has_times)
+        self._use = LineUse(session.line, has_times=session.timing.has_times, is_assumed=session.line_is_assumed)
         adapter = session.adapter
         self._senders = Senders(session.timing, adapter.packets)
         self._is_of_text = LineSettings.parse((dissector or dissector_for(session)).default_line).data_bits == 7

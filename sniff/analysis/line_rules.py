@@ -278,8 +278,8 @@ _ALL = (
         "LN401",
         Severity.NOTE,
         "bus near its limit",
-        "Octets on the line in over 80% of 10 s; a warning over 92% of 30 s. The gaps that a protocol needs between "
-        "its frames come on top of that.",
+        "Octets on the line in over 80% of 10 s; a warning over 92% of 30 s, unless nobody said the baud rate, or "
+        "more octets came than it can carry. The gaps that a protocol needs between its frames come on top of that.",
         "more is asked than the line can carry, or it waits for nobody: a lost frame costs the next ones their turn",
         "poll less often, read whole blocks, a higher baud rate, or another line for some of the stations",
     ),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dissectors.findings import EVIDENCE_MAX, Finding, Severity, Tally, found
@@ -31,15 +32,20 @@ BROADCASTS_FELT, BROADCASTS_COSTLY = 0.03, 0.15
 ONLY_BROADCASTS = 0.95
 """Of all octets: a bus that is made for them."""
 
+MORE_THAN_ALL = 1.02
+"""Of the time, from which on so many octets cannot have come at that rate."""
+
 
 class LineUse:
     """Fed every row of one bus; `findings` may be asked at any time.
 
-    `has_times`: false of a log without times, which says nothing of load.
+    `has_times`: false of a log without times, which says nothing of load. `is_assumed`: nobody said the rate; what
+    share of the time octets take is only a guess then, and warns of nothing.
     """
 
-    def __init__(self, line: LineSettings, *, has_times: bool = True) -> None:
+    def __init__(self, line: LineSettings, *, has_times: bool = True, is_assumed: bool = False) -> None:
         self._has_times = has_times
+        self._baud, self._is_assumed = line.baud, is_assumed
         self._char = line.char
         self._busy = 0  # ns of octets in all
         self._second: int | None = None
@@ -132,20 +138,32 @@ class LineUse:
             average = min(1.0, self._busy / max(1, self._last - (self._first or 0)))
             most = min(1.0, self._most[span])
             seen = f"octets on the line in {most:.0%} of {span} s at the busiest, {average:.0%} of all time"
-            yield found(
+            is_sure = full >= FULL and not self._is_assumed and self._most[span] <= MORE_THAN_ALL
+            told = found(
                 RULES["LN401"],
                 "bus",
-                seen,
+                f"{seen}, at {self._baud} Bd, which nobody said" if self._is_assumed else seen,
                 first=self._when[span],
                 last=self._when[span] + span * NS_PER_S,
-                severity=Severity.WARNING if full >= FULL else Severity.NOTE,
+                severity=Severity.WARNING if is_sure else Severity.NOTE,
             )
+            yield told if self._most[span] <= MORE_THAN_ALL else self._too_many(told, span)
         share = self._broadcast_busy / self._busy if self._busy else 0.0
         duration = self._last - (self._first or 0)
         of_time = self._broadcast_busy / max(1, duration)
         if self._broadcast.count >= BROADCASTS_LEAST and share >= BROADCASTS_NOTED and of_time >= BROADCASTS_FELT:
-            rate = self._broadcast.count / max(1, duration // NS_PER_S)
-            seen = f"{self._broadcast.count} broadcasts, {share:.0%} of all octets, {of_time:.0%} of all time"
+            rate = self._broadcast.count * NS_PER_S / max(1, duration)
+            seen = f"{self._broadcast.count} broadcasts, {share:.0%} of all octets"
+            seen += "" if self._is_assumed else f", {of_time:.0%} of all time"
             is_costly = BROADCASTS_TOO_MANY <= share < ONLY_BROADCASTS and of_time >= BROADCASTS_COSTLY
-            severity = Severity.WARNING if is_costly else Severity.NOTE
+            severity = Severity.WARNING if is_costly and not self._is_assumed else Severity.NOTE
             yield self._broadcast.found(RULES["LN402"], "bus", f"{seen}, {rate:.1f} a second", severity)
+
+    def _too_many(self, told: Finding, span: int) -> Finding:
+        """Of more octets than the line can carry: what is known of it is wrong, and the bus may have all the room."""
+        return replace(
+            told,
+            seen=f"more octets than {self._baud} Bd carry: {self._most[span]:.0%} of {span} s at the busiest",
+            means="the line runs at a higher baud rate than was said, or the times are not those of the line",
+            next="the baud rate that was said (`-s`), and what clock stamped the octets",
+        )

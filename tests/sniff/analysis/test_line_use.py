@@ -18,9 +18,11 @@ S = 1_000_000_000
 OCTETS = 96  # 100 ms
 
 
-def used(shares: list[float], broadcast: float = 0.0) -> dict[str, Finding]:
+def used(
+    shares: list[float], broadcast: float = 0.0, line: LineSettings = LINE, *, is_assumed: bool = False
+) -> dict[str, Finding]:
     """Ten frames a second, of which so large a share is sent; every so many of them a broadcast."""
-    use, no = LineUse(LINE), 0
+    use, no = LineUse(line, is_assumed=is_assumed), 0
     for second, share in enumerate(shares):
         for tenth in range(10):
             if tenth < round(10 * share):
@@ -55,6 +57,33 @@ def test_a_pause_begins_anew() -> None:
 def test_broadcasts(share: float, severity: Severity | None) -> None:
     found = used([0.4] * 60, share).get("LN402")
     assert (found.severity if found is not None else None) is severity
+
+
+def test_what_a_rate_that_nobody_said_tells_is_a_guess() -> None:
+    told = used([0.3] * 5 + [1.0] * 35, is_assumed=True)["LN401"]
+    assert told.severity is Severity.NOTE
+    assert told.seen.endswith(", at 9600 Bd, which nobody said")
+    broadcasts = used([0.4] * 60, 0.6, is_assumed=True)["LN402"]
+    assert broadcasts.severity is Severity.NOTE
+    assert "of all time" not in broadcasts.seen
+
+
+def test_more_octets_than_the_line_carries_are_no_load_of_it() -> None:
+    told = used([1.0] * 40, line=LineSettings.parse("4800,8N1"))["LN401"]
+    assert told.severity is Severity.NOTE
+    assert told.seen.startswith("more octets than 4800 Bd carry: ")
+    assert "baud rate" in told.means
+
+
+@pytest.mark.parametrize("tenths", [15, 19, 25])
+def test_broadcasts_a_second_are_told_of_the_time_that_passed(tenths: int) -> None:
+    use = LineUse(LINE)
+    for no in range(10 * tenths):
+        end = 7 * S + (no + 1) * S // 100
+        frame = Frame("x", b"123", end - 3 * LINE.char, end, Check.GOOD, FoundBy.GAP)
+        use.see(no, frame, Role.BROADCAST)
+    (told,) = use.findings()
+    assert float(told.seen.rsplit(", ", 1)[1].split()[0]) == pytest.approx(100, rel=0.02)
 
 
 def test_broadcasts_that_leave_the_line_free_are_nobodys_trouble() -> None:
