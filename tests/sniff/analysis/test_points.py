@@ -187,3 +187,14 @@ def test_what_is_no_number_and_stays_so_did_not_change() -> None:
     later.add([sample(9, float("nan"))])
     (point,) = table.merge(later)
     assert point.changed == 2
+
+
+def test_reads_and_writes_of_a_point_are_counted_apart() -> None:
+    read, write = ("010325020001", "0103021770"), ("010625021388", "010625021388")
+    point: Point | None = None
+    for sample in samples(read, write, read, read, write, devices=ALL_E510):
+        point = Point(sample) if point is None else point
+        point.add(sample)
+    assert point is not None
+    assert (point.count, point.written) == (5, 2)
+    assert (point.low, point.high) == (50.0, 60.0)

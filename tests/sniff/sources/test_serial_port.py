@@ -339,3 +339,15 @@ def test_a_port_that_goes_while_it_is_set_is_trouble_not_a_crash(source, monkeyp
         patched.setattr(termios, "tcflush", gone)
         with pytest.raises(PortError, match="Input/output error"):
             SerialSource(source.device, LINE, Clock.start())
+
+
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [("9600,7E1", (9600, 7, "E", 1)), ("19200,8O2", (19200, 8, "O", 2)), ("38400,8N1", (38400, 8, "N", 1))],
+)
+def test_all_of_the_line_settings_are_the_ports(settings: str, told: tuple[int, int, str, int]) -> None:
+    """A pseudo-terminal has eight bits and no parity whatever is asked for."""
+    port = tty.ListeningPort()
+    port.apply(LineSettings.parse("1200,8N1"))
+    port.apply(LineSettings.parse(settings))
+    assert (port.baudrate, port.bytesize, port.parity, port.stopbits) == told
