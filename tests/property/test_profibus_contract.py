@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -69,11 +71,31 @@ def test_one_wrong_octet_is_never_a_good_telegram(octets, at, change):
     assert wrong not in [frame.octets for frame in good]
 
 
-@given(st.binary(max_size=400))
-def test_octets_without_a_telegram_show_no_token_and_no_acknowledgement(octets):
-    for event in read(octets):
-        if isinstance(event, Frame) and event.ok and len(event.octets) <= 3:
-            assert any(is_sound(octets[a:b]) for a in range(len(octets)) for b in (a + 6, a + 14)) or octets.count(0xDC)
+believable = st.lists(
+    st.one_of(
+        st.builds(token, st.integers(2, 4), st.integers(2, 4)),
+        st.lists(st.integers(2, 4), max_size=9).map(lambda way: b"".join(token(to, by) for by, to in pairwise(way))),
+        st.sampled_from([SC, STATUS[:-1], b"\xdc", b"\x10"]),
+        st.binary(max_size=3),
+    ),
+    max_size=40,
+).map(b"".join)
+"""Octets that begin as telegrams do, and tokens in any order: some of them may be passed on."""
+
+
+@given(st.one_of(st.binary(max_size=400), believable))
+def test_octets_without_a_telegram_show_no_acknowledgement_and_tokens_only_in_a_chain(octets):
+    if any(is_sound(octets[a:b]) for a in range(len(octets)) for b in (a + 6, a + 14)):
+        return
+    believed = frames(octets)
+    assert SC not in believed
+    tokens = [(one[2], one[1]) for one in believed if one[:1] == b"\xdc"]
+    assert all(any(to == by for by, _ in tokens) or any(by == to for _, to in tokens) for by, to in tokens)
+
+
+def test_tokens_without_a_chain_are_believed_nowhere():
+    assert frames(token(3, 2) + token(5, 4) + token(7, 6)) == []
+    assert frames(SC + token(3, 2) + SC + token(5, 4) + SC) == []
 
 
 def test_tokens_are_told_by_the_ring_alone():

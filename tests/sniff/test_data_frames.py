@@ -22,6 +22,7 @@ from dissectors.line import LineSettings
 from sniff.bus.capture_writer import create
 from sniff.bus.columns import FRAMES, TRANSACTIONS
 from sniff.bus.offline import outputs
+from sniff.bus.sample_row import COLUMNS
 from sniff.cli import main
 from sniff.data_frames import IncompleteCapture, NoDataFrames
 from sniff.devices import UnknownProfile
@@ -93,7 +94,9 @@ def test_pandas_where_only_pandas_is(name: str, shown: Shown, monkeypatch: pytes
     assert list(capture.transactions()) == list(TRANSACTIONS)
     assert str(frame["t"].dtype) == "datetime64[ns, UTC]"
     assert str(frame["kind"].dtype) == "category"
-    assert len(sniff.read(path, devices="*=teco-e510").values()) >= 0
+    values = sniff.read(path, devices="*=teco-e510").values()
+    assert set(values) == {*COLUMNS, "time_ns"}
+    assert len(values) > 0
 
 
 @needs_polars

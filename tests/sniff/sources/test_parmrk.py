@@ -3,7 +3,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from dissectors.frame import LineError, Mark
@@ -75,7 +75,11 @@ def test_any_cut_gives_the_line_back(events: list[tuple[int, LineError | None]],
     assert marks == [Mark(at, error) for at, (_, error) in enumerate(events) if error is not None]
 
 
-@given(st.lists(st.binary(max_size=20), max_size=10))
+MARKED = st.lists(st.sampled_from((0xFF, 0xFF, 0x00, 0x00, 0x41)), max_size=20).map(bytes)
+
+
+@given(st.lists(st.one_of(st.binary(max_size=20), MARKED), max_size=10))
+@example([b"A\xff", b"\x00A\xff\x00\x00", b"\xff\xff\xff\x00\x41"])
 def test_any_octets_are_survived_and_none_invented(reads: list[bytes]) -> None:
     decoder = ParmrkDecoder(parity=False)
     given_back = 0
