@@ -93,6 +93,13 @@ class Histogram:
                 return self.tops[bucket]
         return self.most
 
+    def apart(self, low: float, high: float) -> int | None:
+        """How far apart the values from one share to another are, at most: those of one bucket are not told apart."""
+        least, most = self.quantile(low), self.quantile(high)
+        if least is None or most is None or self.least is None:
+            return None
+        return most - max(self.least, min(least, math.floor(2 ** ((_bucket(least) - 1) / _STEPS))))
+
     def spread(self, edges: Sequence[int]) -> list[int]:
         """Counts of the values below the first edge, between two neighbours …, and from the last edge on (edges
         ascending, ns); a value nearer to an edge than the precision may be counted on its other side."""

@@ -146,9 +146,9 @@ class Poll:
 
     @property
     def jitter(self) -> int | None:
-        """By how much nine of ten intervals differ, halved: ± ns; None with less than three requests."""
-        low, high = self.cycle.quantile(0.05), self.cycle.quantile(0.95)
-        return None if low is None or high is None or self.cycle.count < 2 else (high - low) // 2
+        """By how much nine of ten intervals differ at most, halved: ± ns; None with less than three requests."""
+        apart = self.cycle.apart(0.05, 0.95)
+        return None if apart is None or self.cycle.count < 2 else apart // 2
 
     def merge(self, later: Poll) -> Poll:
         """With what a later stretch saw of the same entry, as a new value."""

@@ -1,5 +1,8 @@
 """Histograms: precise to 2 %, and the whole is the merge of its parts."""
 
+import math
+
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,8 +20,6 @@ def filled(values: list[int]) -> Histogram:
 
 @given(durations, st.floats(0, 1))
 def test_a_quantile_is_right_to_two_percent(values: list[int], share: float) -> None:
-    import math
-
     exact = sorted(values)[max(1, math.ceil(share * len(values))) - 1]
     found = filled(values).quantile(share)
     assert found is not None
@@ -60,3 +61,18 @@ def test_many_in_groups_are_the_same_as_one_after_the_other(values: list[tuple[i
     groups, durations = (np.array(column, np.int64) for column in (zip(*values, strict=True) if values else ((), ())))
     add_grouped(lambda group: at_once.setdefault(group, Histogram()), groups, durations)
     assert at_once == one_by_one
+
+
+@pytest.mark.parametrize(
+    "values",
+    [[1000] * 9, [1057, 1062, 1065, 1068, 1069, 1070, 1073], [5, 900, 901, 902, 903, 20_000], list(range(1000, 1400))],
+)
+def test_values_are_no_farther_apart_than_is_said(values: list[int]) -> None:
+    held = filled(values)
+    for low, high in ((0.05, 0.95), (0.3, 0.7), (0, 1)):
+        least, most = (values[max(1, math.ceil(share * len(values))) - 1] for share in (low, high))
+        apart = held.apart(low, high)
+        assert apart is not None
+        assert most - least <= apart <= most - least + 0.05 * most
+    assert Histogram().apart(0, 1) is None
+    assert (held.apart(0, 1) == 0) is (values[0] == values[-1])
