@@ -97,6 +97,7 @@ class BusRecord:
     strikes: Strikes = field(default_factory=Strikes)  # "master", "station 3" …
     late_speakers: LateSpeakers = field(default_factory=LateSpeakers)
     unasked: Tally = field(default_factory=Tally)
+    unasked_behind_noise: int = 0
     again: Again = field(default_factory=Again)
     crossed: Tally = field(default_factory=Tally)
     asked_twice: Tally = field(default_factory=Tally)

@@ -188,6 +188,7 @@ class ModbusFindings(RowObserver):
             self.seen.damaged_requests.add(transaction.start, transaction.response)
             return
         self.seen.unasked.add(transaction.start, transaction.response)
+        self.seen.unasked_behind_noise += transaction.response == self.rubbish + 1
 
     def settle_request(
         self,

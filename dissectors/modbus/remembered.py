@@ -79,6 +79,7 @@ class Remembered:
         self.copied: deque[int | None] = deque(maxlen=64)  # the last transactions whose request came twice at once
         self.no_requests: deque[int] = deque(maxlen=64)  # frames that the tracker takes for requests, but are none
         self.damaged: deque[int] = deque(maxlen=64)  # transactions of the last damaged answers
+        self.rubbish = -1  # the newest row of so many octets that are no frame that they may have been a request
         self.before_all: int | None = None  # the row of the first answer, if no request came before it
         self.contradictory: deque[int] = deque(maxlen=64)  # transactions whose good answer contradicts itself
         self.flaws: dict[int, Flaw] = {}  # of damaged frames, by transaction

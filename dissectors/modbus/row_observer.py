@@ -25,6 +25,9 @@ TURNAROUND = 90 * MS
 AT_ONCE = 50 * MS
 """No master repeats a request so soon."""
 
+_LEAST_REQUEST = 4
+"""Octets of the shortest request."""
+
 STRAY_KEPT = 600
 """Octets, more than the longest frame; of more nothing is said."""
 
@@ -51,6 +54,7 @@ class RowObserver(Remembered):
             self._gather(event)
             self._see_broken(no, event, event.octets)
             self._see_noise(no, event)
+            self.rubbish = no if len(event.octets) >= _LEAST_REQUEST else self.rubbish
             self.open = None
             self.gaps.hear_noise()
             self.ends.hear_noise(event)

@@ -101,7 +101,8 @@ def _of_bus(seen: BusRecord, is_blamed: bool, scanned: list[int], unheard: list[
     unasked = seen.unasked
     if unasked.count:
         words = f"{unasked.count} of {counted(seen.answers, 'answer')} came unasked"
-        many = unasked.count >= 3 and 100 * unasked.count >= seen.answers
+        of_themselves = unasked.count - seen.unasked_behind_noise
+        many = of_themselves >= 3 and 100 * of_themselves >= seen.answers
         yield unasked.found(RULES["MB207"], "bus", words, Severity.WARNING if many else None)
     yield from _cycle(seen)
 

@@ -236,6 +236,21 @@ def test_noise_that_falls_anywhere_is_the_buses(bus):
     assert {code for code, _ in graves_of(bus)} == {"MB007"}
 
 
+@pytest.mark.parametrize(("is_noisy", "root"), [(True, "MB007"), (False, "MB207")])
+def test_an_answer_behind_rubbish_had_its_request(bus, is_noisy, root):
+    for turn in range(80):
+        for asked, value in ((OTHER, OTHER_VALUES), (READ, VALUES)):
+            if turn % 8 == 3:
+                bus.say(asked, 40).damage(value, at=turn // 8 % 6).say(asked, 300).say(value)
+            elif turn % 16 == 13 and is_noisy:
+                bus.noise(bytes((0xA7, 0x55, 0x13, 0xC9, 0x08, turn)), 40).say(value)
+            elif turn % 16 == 13:
+                bus.say(value, 60)
+            else:
+                bus.exchange(asked, value)
+    assert {code for code, subject in graves_of(bus) if subject == "bus"} == {root}
+
+
 def test_who_has_more_than_its_share_is_blamed(bus):
     for turn in range(60):
         bus.exchange(OTHER, OTHER_VALUES)
