@@ -102,14 +102,18 @@ class Finding:
         """What one rule found about one subject in two captures of a bus: counts add up, times span both.
 
         Words and evidence are those of the graver one, of this one where both are as grave: frames are numbered by
-        capture, and of many it must not matter which are put together first. Raises ValueError for findings of two
-        things.
+        capture, and of many it must not matter which are put together first. It concerns the stations of both. Raises
+        ValueError for findings of two things.
         """
         if (self.code, self.subject) != (other.code, other.subject):
             raise ValueError(f"{self.code} {self.subject} and {other.code} {other.subject} are two things")
         told = max(self, other, key=lambda finding: finding.severity)
         count = self.count + other.count
-        return replace(told, count=count, first=min(self.first, other.first), last=max(self.last, other.last))
+        stations = self.stations
+        if stations != other.stations:  # where either concerns everybody, both do
+            stations = tuple(sorted({*stations, *other.stations})) if stations and other.stations else ()
+        first, last = min(self.first, other.first), max(self.last, other.last)
+        return replace(told, count=count, first=first, last=last, stations=stations)
 
 
 def merged(parts: Iterable[Iterable[Finding]]) -> tuple[Finding, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import chain
 
 import pytest
@@ -55,6 +56,14 @@ def test_words_and_evidence_are_of_one_capture() -> None:
     grave = Finding("MB001", Severity.ERROR, "station 4", 20, 29, 4, (7,), "4 of 4", "dead", "look")
     for both in (mild.merge(grave), grave.merge(mild)):
         assert both == Finding("MB001", Severity.ERROR, "station 4", 0, 29, 44, (7,), "4 of 4", "dead", "look")
+
+
+def test_what_is_found_of_the_bus_concerns_the_stations_of_all_parts() -> None:
+    one = Finding("LN305", Severity.ERROR, "bus", 0, 9, 2, (), "2 and 3 lost", "", "", stations=(3, 2))
+    other = replace(one, stations=(4, 3), severity=Severity.WARNING)
+    assert one.merge(other).stations == other.merge(one).stations == (2, 3, 4)
+    assert one.merge(one).stations == (3, 2)
+    assert one.merge(replace(other, stations=())).stations == ()
 
 
 def test_two_things_do_not_merge() -> None:
