@@ -89,7 +89,8 @@ class Remains:
         rests, line = self._first, self._session.line
         same, often = Counter(rests).most_common(1)[0] if rests else (b"", 0)
         if often >= 3 and 2 * often >= len(rests):
-            words = f"{finding.seen}; the same {len(same)} octets {often} times ({same[:8].hex(' ').upper()}"
+            how_often = f"{often} times" if self._tally.count <= len(rests) else f"in {often} of {len(rests)} compared"
+            words = f"{finding.seen}; the same {counted(len(same), 'octet')} {how_often} ({same[:8].hex(' ').upper()}"
             finding = replace(finding, seen=words + (" …)" if len(same) > 8 else ")"))
         fit = self._other_protocol()
         if fit is not None:

@@ -49,6 +49,18 @@ def test_how_much_is_no_frame(lengths: Sequence[int], of_all: int, said: str) ->
     assert found.seen == said
 
 
+@pytest.mark.parametrize(
+    ("many", "said"), [(6, "the same 5 octets 6 times"), (40, "the same 5 octets in 16 of 16 compared")]
+)
+def test_how_often_stretches_are_the_same_is_said_of_those_that_are_kept(many: int, said: str) -> None:
+    remains = Remains(Session(port="test", line=LineSettings(), protocol="modbus-rtu"))
+    for no in range(many):
+        remains.add(no, Noise(b"\x41\x42\x43\x44\x45", no, no, Place.BETWEEN, Reason.NO_FRAME))
+    found = remains.found(10_000)
+    assert found is not None
+    assert said in found.seen
+
+
 def _hear(line: LineFindings, *, slack: int = 0, damage: Damage | None = None, rounds: int = 30) -> Severity | None:
     """Octets between frames, again and again; how grave what is said of them is."""
     second = 1_000_000_000
