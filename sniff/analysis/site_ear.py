@@ -23,6 +23,8 @@ Keys = npt.NDArray[np.uint64]
 
 MOST_FRAMES = 200_000
 MOST_EVENTS = 1000
+_RECENT = 64
+"""Rows within which exchanges close."""
 
 _REQUEST, _RESPONSE = ROLES.index(Role.REQUEST), ROLES.index(Role.RESPONSE)
 _ANSWERED = VERDICTS.index(Verdict.ANSWERED)
@@ -69,6 +71,7 @@ class SiteEar:
         self._heard: list[HeardFrames] = []
         self._exchanges: list[AnsweredExchanges] = []
         self._open: dict[int, tuple[int, int, int]] = {}  # row of a request: start, end, what it wants
+        self._rows: dict[int, tuple[int, int]] = {}  # the newest, one of which may be an answer: start, end
 
     def add(self, output: Output) -> None:
         """Take rows one by one."""
@@ -85,7 +88,7 @@ class SiteEar:
     def add_table(self, table: Table) -> None:
         """Take rows that follow."""
         self._was_there |= len(table) > 0
-        if self._frames >= MOST_FRAMES or not len(table):
+        if self._frames >= MOST_FRAMES or not (len(table) or len(table.transactions)):
             return
         frames = table.frames
         role = table.shown("role")
@@ -99,9 +102,10 @@ class SiteEar:
             key = fingerprints(octets, edges, lengths[places])
             self._heard.append(HeardFrames(frames.start[places], frames.end[places], key, role[places] == _REQUEST))
         self._exchange(table, places[role[places] == _REQUEST])
+        self._keep_recent(table)
 
     def _exchange(self, table: Table, requests: Times) -> None:
-        """Keep what was answered; a request may be in a table before."""
+        """Keep what was answered; a request, and its answer, may be in a table before."""
         frames, closed = table.frames, table.transactions
         wanted = _wanted(table, requests)
         for place, want in zip(requests.tolist(), wanted.tolist(), strict=True):
@@ -111,8 +115,11 @@ class SiteEar:
         for place in np.flatnonzero(good).tolist():
             asked = self._open.get(int(closed.request[place]))
             back = int(closed.response[place]) - table.first
-            if asked is not None and 0 <= back < len(table):
-                rows.append((int(closed.station[place]), *asked, int(frames.start[back]), int(frames.end[back])))
+            answer = self._rows.get(int(closed.response[place]))
+            if 0 <= back < len(table):
+                answer = int(frames.start[back]), int(frames.end[back])
+            if asked is not None and answer is not None:
+                rows.append((int(closed.station[place]), *asked, *answer))
         if rows:
             station, start, end, want, back_at, done = zip(*rows, strict=True)
             self._exchanges.append(
@@ -125,9 +132,17 @@ class SiteEar:
                     np.array(want, np.uint64),
                 )
             )
-        newest = table.first + len(table)
-        if len(self._open) > 64:
-            self._open = {row: one for row, one in self._open.items() if row >= newest - 64}
+
+    def _keep_recent(self, table: Table) -> None:
+        """Keep of a table, and of those before it, what exchanges may close with that have not."""
+        frames, begin = table.frames, max(0, len(table) - _RECENT)
+        ends = zip(frames.start[begin:].tolist(), frames.end[begin:].tolist(), strict=True)
+        self._rows.update(enumerate(ends, table.first + begin))
+        least = table.first + len(table) - _RECENT
+        if len(self._rows) > 2 * _RECENT:
+            self._rows = {row: one for row, one in self._rows.items() if row >= least}
+        if len(self._open) > _RECENT:
+            self._open = {row: one for row, one in self._open.items() if row >= least}
 
     def heard(self) -> HeardFrames:
         """The first frames."""

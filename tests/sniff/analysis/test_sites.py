@@ -12,14 +12,16 @@ import pytest
 from dissectors.findings import Finding, Severity
 from dissectors.frame import Chunk
 from dissectors.line import MS
+from dissectors.modbus.envelope import seal_rtu
 from sniff.analysis.site_ear import MOST_FRAMES, SiteEar
 from sniff.analysis.site_findings import SiteJudgement, judged
 from sniff.analysis.site_rules import SITE_RULES
 from sniff.bus.model import BusModel
-from sniff.bus.offline import survey
+from sniff.bus.offline import outputs, survey
 from sniff.bus.site import site_bus
 from sniff.cli import main
 from sniff.engine.blocks import Block, blocks_of
+from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Item, LineEvent, LineEventKind, gone
 from tests.sniff.analysis.sites_made import BASE, SITES, Site, sessions, write
@@ -115,6 +117,23 @@ def test_little_is_kept_of_a_long_capture() -> None:
     session = sessions(made)[0]
     survey(Given(made["near"]), session, ear)
     assert len(ear.heard()) == 0
+
+
+def test_an_exchange_that_closes_after_its_answer_came_is_one() -> None:
+    """A write and its confirmation are the same octets: which is which is known when somebody goes on."""
+    session = sessions({"east": []})[0]
+    chunks: list[Item] = []
+    for pdu in ("020300000001", "0203020000", "020600030001", "020600030001", "020300000001", "0203020000"):
+        chunks.append(Chunk((chunks[-1].time if chunks else BASE) + 50 * MS, seal_rtu(bytes.fromhex(pdu))))
+    whole, apart = SiteEar(), SiteEar()
+    survey(Given(chunks), session, whole)
+    for output in outputs(chunks, session):
+        if isinstance(output, Output):
+            for row in output.rows:
+                apart.add(Output((row,), ()))
+            apart.add(Output((), output.transactions))
+    assert len(whole.exchanges()) == 3
+    assert whole.exchanges().answered.tolist() == apart.exchanges().answered.tolist()
 
 
 def test_ports_that_were_never_there_did_not_go() -> None:
