@@ -29,11 +29,17 @@ _AGAIN_KEPT, _AGAIN_LEAST = 256, 8
 _AGAIN_SOON = 150 * MS  # hardly a master repeats sooner
 _UNHEARD_LEAST = 3
 _CLOSE_KEPT = 4096
+_HASTY_KEPT = 256
 _WORDS_KEPT = 16
 _LATE_KEPT = 4096
 
 PAUSE_MARGIN = 5
 """So many times the adapter's delay must fit into 1.5 characters before pauses inside frames are judged."""
+
+
+Hasty = tuple[int, int, int, int, int]
+"""A request after another that nothing had followed: the longest reading of the silence between (ns), the unit asked
+before, time, frame before, frame."""
 
 
 def _no_words(unit: int, code: int) -> str:
@@ -66,10 +72,10 @@ class Again:
 class BusRecord:
     """What was seen on the bus. Times are ns.
 
-    `hasty`: requests after another that nothing had followed: (longest reading of the silence between, unit asked
-    before, time, frame before, frame). `broken_in`: the same of
-    damaged frames that begin as a request to another station. `close`, `paused`: by sender; of the first,
-    (time, frame before, frame). `odd_ends`: ASCII frames that do not end with CR LF, by how they end and by sender.
+    `hasty`: requests after another that nothing had followed. `broken_in`: the same of damaged frames that begin as a
+    request to another station. `too_many`: whether there were more such than are kept. `close`, `paused`: by sender; of
+    the first the first ones, (time, frame before, frame), `close_ever`: all. `odd_ends`: ASCII frames that do not end
+    with CR LF, by how they end and by sender.
     `held_back`: of the paused frames, those that an adapter may have made so that nobody named.
     `damaged_here`: damaged requests that were answered all the same.
     `again`: requests that were answered when they came a second time.
@@ -103,9 +109,11 @@ class BusRecord:
     asked_twice: Tally = field(default_factory=Tally)
     answers_to_broadcast: Tally = field(default_factory=Tally)
     noise_after_broadcast: Tally = field(default_factory=Tally)
-    hasty: list[tuple[int, int, int, int, int]] = field(default_factory=list)
-    broken_in: list[tuple[int, int, int, int, int]] = field(default_factory=list)
+    hasty: list[Hasty] = field(default_factory=list)
+    broken_in: list[Hasty] = field(default_factory=list)
+    too_many: bool = False
     close: dict[str, list[tuple[int, int, int]]] = field(default_factory=dict)
+    close_ever: dict[str, Tally] = field(default_factory=dict)
     paused: dict[str, Tally] = field(default_factory=dict)
     held_back: Counter[str] = field(default_factory=Counter)
     odd_ends: dict[tuple[OddEnd, str], Tally] = field(default_factory=dict)
@@ -198,7 +206,7 @@ class BusRecord:
     def cannot_be(self, why: str, time: int, *frames: int | None) -> None:
         """Note a request that nobody can carry out, with its frames."""
         self.malformed.add(time, *frames)
-        if len(self.malformed_words) < _WORDS_KEPT:
+        if why in self.malformed_words or len(self.malformed_words) < _WORDS_KEPT:
             self.malformed_words[why] += 1
 
     def too_close(self, sender: str, time: int, before: int, no: int) -> None:
@@ -206,6 +214,32 @@ class BusRecord:
         calls = self.close.setdefault(sender, [])
         if len(calls) < _CLOSE_KEPT:
             calls.append((time, before, no))
+        self.close_ever.setdefault(sender, Tally()).add(time)
+
+    def close_frames(self, sender: str) -> Tally:
+        """Frames of a sender that began too soon, but for late answers; of many what holds for the first ones."""
+        tally, every = Tally(), self.close_ever[sender]
+        for time, before, no in self.close[sender]:
+            if before not in self.late_frames and no not in self.late_frames:
+                tally.add(time, before, no)
+        if every.count > len(self.close[sender]) and tally.count:
+            tally.count, tally.last = tally.count * every.count // len(self.close[sender]), every.last
+        return tally
+
+    def broke_in(self, rows: list[Hasty], row: Hasty) -> None:
+        """Note one more of `hasty` or `broken_in`; where they are many, those that tell something stay."""
+        if len(rows) >= _HASTY_KEPT:
+            rows[:] = self.too_hasty(rows)
+        if len(rows) < _HASTY_KEPT:
+            rows.append(row)
+        else:
+            self.too_many |= bool(self.too_hasty([row]))
+
+    def too_hasty(self, rows: list[Hasty]) -> list[Hasty]:
+        """Those that came sooner than the station asked before has ever answered, which is there; no late answers."""
+        units = {row[1]: self.stations[row[1]] for row in rows if row[1] in self.stations}
+        soonest = {u: s.times.soonest() for u, s in units.items() if s.answered >= 3 and 2 * s.answered > s.asked}
+        return [row for row in rows if 10 * row[0] < 9 * soonest.get(row[1], 0) and row[4] not in self.late_frames]
 
     def late(self, no: int | None) -> None:
         """Note an answer that came too late."""
@@ -214,7 +248,8 @@ class BusRecord:
 
     def pair(self, pair: tuple[int, int]) -> Tally:
         """The record of one unit that answers for another."""
-        return self.pairs.setdefault(pair, Tally()) if len(self.pairs) < _SENDERS_KEPT else self.unasked
+        is_kept = pair in self.pairs or len(self.pairs) < _SENDERS_KEPT
+        return self.pairs.setdefault(pair, Tally()) if is_kept else self.unasked
 
     def ended_oddly(self, sender: str) -> int:
         """Frames of a sender that are damaged by their end alone."""

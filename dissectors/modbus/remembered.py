@@ -25,7 +25,6 @@ SLOW_UNLEARNT = 500 * MS
 
 LAST_STANDARD_UNIT = 247
 OPEN_KEPT = 4096
-HASTY_KEPT = 256
 LOST_KEPT = 64
 FINAL_KEPT = 64
 BEGIN = 5
@@ -47,8 +46,9 @@ class Unfit:
         """Hold it against the station."""
         one, station = self.transaction, self.station
         station.unfit.add(one.end, one.request, one.response)
-        if one.error is not None and len(station.unfit_words) < _WORDS_KEPT:
-            station.unfit_words[one.error] += 1
+        words = station.unfit_words
+        if one.error is not None and (one.error in words or len(words) < _WORDS_KEPT):
+            words[one.error] += 1
 
 
 def slow_limit(timeout: int | None) -> int | None:

@@ -11,7 +11,6 @@ from dissectors.modbus.functions import BROADCAST, COPIED, EXCEPTION_BIT, FUNCTI
 from dissectors.modbus.long_silences import SILENCE_LEAST
 from dissectors.modbus.remembered import (
     BEGIN,
-    HASTY_KEPT,
     LAST_STANDARD_UNIT,
     LOST_KEPT,
     OPEN_KEPT,
@@ -147,8 +146,8 @@ class RowObserver(Remembered):
         self.waits[before.no] = gap, asked.no
         if len(self.waits) > LOST_KEPT:
             del self.waits[next(iter(self.waits))]
-        if len(self.seen.hasty) < HASTY_KEPT:
-            self.seen.hasty.append((gap + before.frame.slack, before.unit, asked.frame.start, before.no, asked.no))
+        row = gap + before.frame.slack, before.unit, asked.frame.start, before.no, asked.no
+        self.seen.broke_in(self.seen.hasty, row)
 
     def _see_answer(self, no: int, frame: Frame, header: Header, placement: Placement, octets: bytes) -> None:
         if not self.seen.answers and not self.seen.requests:
@@ -224,8 +223,8 @@ class RowObserver(Remembered):
         if asked is None or begin not in self.begins or begin[0] == asked.unit:
             return
         gap = max(0, event.start - asked.frame.end)
-        if len(self.seen.broken_in) < HASTY_KEPT:
-            self.seen.broken_in.append((gap + asked.frame.slack, asked.unit, event.start, asked.no, no))
+        row = gap + asked.frame.slack, asked.unit, event.start, asked.no, no
+        self.seen.broke_in(self.seen.broken_in, row)
 
     def _is_cut_echo(self, no: int, event: Event) -> bool:
         """Whether it is the begin of the request before it, given back at once and cut short, or goes on with that."""

@@ -208,12 +208,7 @@ def _of_masters(seen: BusRecord) -> Iterator[Finding]:
     An answer that this tap missed cannot have come before, and a master that never waits sends after the same time
     always: both are left out. So is what turned out to be a late answer, and no request.
     """
-    alive = {unit: s for unit, s in seen.stations.items() if s.answered >= 3 and 2 * s.answered > s.asked}
-
-    def too_soon(row: tuple[int, int, int, int, int]) -> bool:
-        return row[4] not in seen.late_frames and row[1] in alive and 10 * row[0] < 9 * alive[row[1]].times.soonest()
-
-    hasty, broken_in = list(filter(too_soon, seen.hasty)), list(filter(too_soon, seen.broken_in))
+    hasty, broken_in = seen.too_hasty(seen.hasty), seen.too_hasty(seen.broken_in)
     gaps = sorted(row[0] for row in (*hasty, *broken_in))
     same = MS + seen.timing.latency
     habitual = max((sum(abs(one - gap) <= same for one in gaps) for gap in gaps), default=0)
@@ -224,7 +219,8 @@ def _of_masters(seen: BusRecord) -> Iterator[Finding]:
     tally = Tally()
     for _, _, time, before, no in sorted((*hasty, *broken_in), key=lambda row: row[2]):
         tally.add(time, before, no)
-    words = f"{len(gaps)} requests came while another one waited for a station that answers, and never so soon"
+    many = f"over {len(gaps)}" if seen.too_many else len(gaps)
+    words = f"{many} requests came while another one waited for a station that answers, and never so soon"
     if gaps[len(gaps) // 2] < 10 * MS:
         words += f"; half of them within {fine_milliseconds(gaps[len(gaps) // 2])}"
     yield tally.found(RULES["MB203"], "bus", words)
@@ -282,11 +278,8 @@ def _of_gaps(seen: BusRecord) -> Iterator[Finding]:
 def _too_close(seen: BusRecord) -> Iterator[Finding]:
     """Frames directly behind others: of those whose habit it is; where all stations do so, so speaks this bus."""
     habits: dict[str, Tally] = {}
-    for sender, calls in sorted(seen.close.items()):
-        tally = Tally()
-        for time, before, no in calls:
-            if before not in seen.late_frames and no not in seen.late_frames:
-                tally.add(time, before, no)
+    for sender in sorted(seen.close):
+        tally = seen.close_frames(sender)
         count, frames = tally.count, seen.frames[sender]
         if seen.timing.is_told:
             is_habit = count >= _CLOSE_LEAST and _HABIT * count >= frames
