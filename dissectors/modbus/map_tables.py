@@ -56,7 +56,13 @@ _SPACES = {
 _BY_FUNCTION = {word: space for space, words in _SPACES.items() for word in words.split()}
 _TABLE_DIGIT = {0: "coil", 1: "discrete", 3: "input", 4: "holding"}
 _HEX = re.compile(r"(?:0x|\$|#)([0-9a-f]{1,4})|([0-9a-f]{1,4})\s*h(?:ex)?", re.IGNORECASE)
-_DECIMAL = re.compile(r"(\d{1,6})(?:\s*(?:-|…|\.\.|–|to|/|,|:)\s*(\d{1,6}))?")
+_DECIMAL = re.compile(r"(\d{1,6})(?:\s*(-|…|\.\.|–|to|/|,|:)\s*(\d{1,6}))?")
+_RANGE = re.compile(r"\s*([+-]?[\d.,]+?)\s*(?:-|–|…|\.\.+|~|to|bis)\s*([+-]?[\d.,]+)\s*(?:[%°A-Za-zµΩ]\S{0,8})?\s*")
+_AMBIGUOUS = re.compile(r"\s*[+-]?[1-9]\d{0,2},\d{3}\s*")
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?(?:0,\d+|\d+,(?:\d{1,2}|\d{4,}))\s*")
+_SPAN_SIGNS = ("-", "…", "..", "–", "to")
+_GROUPED = re.compile(r"(\d{1,2}|[34]00)[,'’ \u00a0\u202f](\d{3})")
+_NOTHING = ("", "-", "–", "n/a", "N/A")
 _PREFIXED = re.compile(r"([0134])[xX:](\d{1,5})")
 
 
@@ -192,11 +198,13 @@ def _number(text: str) -> _Number | None:
         return _Number(int(match[2]), match[2], _TABLE_DIGIT[int(match[1])])
     if match := _HEX.fullmatch(text):
         return _Number(int(match[1] or match[2], 16), "", is_wire=True)
+    if (match := _GROUPED.fullmatch(text)) and (match[2][0] == "0" or int(match[2]) - int(match[1]) >= 4):  # no 99,100
+        return _Number(int(match[1] + match[2]), match[1] + match[2])
     if match := _DECIMAL.fullmatch(text):
         value = int(match[1])
-        last = int(match[2]) if match[2] else None
-        registers = last - value + 1 if last is not None and 0 < last - value < 4 else None
-        return _Number(value, match[1], registers=registers)
+        behind = int(match[3]) - value if match[3] else 0
+        is_span = 0 < behind < 4 or (behind > 0 and match[2] in _SPAN_SIGNS)
+        return _Number(value, match[1], registers=behind + 1 if is_span else None)
     return None
 
 
@@ -224,6 +232,16 @@ def _mapped(found: RegisterMap, row: Mapping[str, str], space: str, address: int
     order = order_of(row.get("order", "")) or order_of(told) or (False, False)
     scale, offset = _scale(found, row), _decimal(row.get("offset", ""))
     low, high = _range(row)
+    states = _states(row.get("states", ""))
+    for column, what, is_read in (
+        ("offset", "offsets", offset is not None),
+        ("low", "limits", low is not None),
+        ("high", "limits", high is not None),
+        ("range", "ranges", low is not None and high is not None),
+        ("states", "lists of states", bool(states)),
+    ):
+        if not is_read and row.get(column, "") not in _NOTHING:
+            found.left_out[f"{what} that cannot be read"] += 1
     entry = Mapped(
         space,
         address,
@@ -237,11 +255,11 @@ def _mapped(found: RegisterMap, row: Mapping[str, str], space: str, address: int
         low,
         high,
         _access(row.get("access", ""), space),
-        _states(row.get("states", "")),
+        states,
         "; ".join(doubts),
         _whole(row.get("station", "")),
     )
-    return replace(entry, unit="" if entry.unit in ("-", "–", "n/a", "N/A") else entry.unit)
+    return replace(entry, unit="" if entry.unit in _NOTHING else entry.unit)
 
 
 def _untold(space: str, registers: int | None) -> Kind:
@@ -255,7 +273,7 @@ def _scale(found: RegisterMap, row: Mapping[str, str]) -> float:
     """raw · scale; a divisor is the same the other way round."""
     text, divisor = row.get("scale", ""), _decimal(row.get("divisor", ""))
     scale = 1.0
-    if text and text not in ("-", "–"):
+    if text not in _NOTHING:
         known = _factor(text)
         if known is None:
             found.left_out["scales that cannot be read"] += 1
@@ -284,12 +302,14 @@ def _decimal(text: str) -> float | None:
 
 
 def _range(row: Mapping[str, str]) -> tuple[float | None, float | None]:
-    """Least and most value, of two columns or of one."""
-    low, high = _decimal(row.get("low", "")), _decimal(row.get("high", ""))
-    match = re.fullmatch(r"\s*([+-]?[\d.,]+)\s*(?:-|–|…|\.\.+|~|to|bis)\s*([+-]?[\d.,]+)\s*", row.get("range", ""))
-    if match is not None and low is None and high is None:
-        return _decimal(match[1]), _decimal(match[2])
-    return low, high
+    """Least and most value, of two columns or of one; none where "1,250" in it may be 1.25 as well as 1250."""
+    low, high = row.get("low", ""), row.get("high", "")
+    match = _RANGE.fullmatch(row.get("range", ""))
+    if match is not None and _decimal(low) is None and _decimal(high) is None:
+        low, high = match[1], match[2]
+    if any(map(_AMBIGUOUS.fullmatch, (low, high))) and not any(map(_DECIMAL_COMMA.fullmatch, (low, high))):
+        return None, None
+    return _decimal(low), _decimal(high)
 
 
 def _whole(text: str) -> int | None:

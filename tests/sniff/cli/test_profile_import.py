@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -88,6 +89,67 @@ def test_sizes_make_types_wide(sniff485: Run, tmp_path: Path) -> None:
     profile, _ = imported(sniff485, tmp_path, text)
     assert [entry.kind for entry in profile.entries] == [Kind.S32, Kind.U64, Kind.U32, Kind.F64]
     assert [bool(entry.doubt) for entry in profile.entries] == [False, False, True, False]
+
+
+@pytest.mark.parametrize(
+    ("number", "space", "address", "width"),
+    [
+        ("40,001", "holding", 0, 1),  # a spreadsheet's thousands
+        ("40 001", "holding", 0, 1),
+        ("300,002", "input", 1, 1),
+        ("40001-40002", "holding", 0, 2),
+        ("40001,40002", "holding", 0, 2),
+        ("40001/2", "holding", 0, 1),
+    ],
+)
+def test_a_number_is_read_as_people_write_it(number: str, space: str, address: int, width: int) -> None:
+    found = read_csv(f"Register;Name\n{number};a\n40100;b\n")
+    assert found is not None
+    one = found.entries[0]
+    assert (one.space, one.address, one.kind.registers, one.title) == (space, address, width, "a")
+
+
+def test_two_registers_are_no_thousands() -> None:
+    found = read_csv("Register;Name\n99,100;a\n300,301;b\n1,002;c\n")
+    assert found is not None
+    assert [(one.address, one.kind.registers) for one in found.entries] == [(99, 2), (300, 2), (1002, 1)]
+
+
+@pytest.mark.parametrize(
+    ("text", "limits"),
+    [
+        ("0-65,535", (None, None)),  # or 65.535
+        ("1,000 … 2,000", (None, None)),
+        ("0,005-1,250", (0.005, 1.25)),
+        ("0-1,5", (0, 1.5)),
+        ("0...100", (0, 100)),
+    ],
+)
+def test_limits_that_may_be_thousands_are_not_guessed(text: str, limits: tuple[float | None, float | None]) -> None:
+    for table in (f"Register;Range\n1;{text}\n", f"Register;Min;Max\n1;{re.sub('-|…|[.]{3}', ';', text)}\n"):
+        found = read_csv(table)
+        assert found is not None
+        assert [(one.low, one.high) for one in found.entries] == [limits]
+
+
+def test_what_cannot_be_read_is_counted(sniff485: Run, tmp_path: Path) -> None:
+    text = (
+        "Register;Name;Range;States;Offset;Max\n"
+        "0-19;block;;;;\n"
+        "20;load;0 - 110 %;;;\n"
+        "21;mode;see page 3;off when 0;minus 40;none\n"
+        "22;spare;-;-;-;n/a\n"
+    )
+    profile, said = imported(sniff485, tmp_path, text)
+    block, load = profile.at("holding", 0), profile.at("holding", 20)
+    assert block is not None
+    assert block.doubt == "the map gives it 20 registers"
+    assert load is not None
+    assert (load.low, load.high) == (0, 110)
+    for left_out in ("20 registers as no type", *(f"{what} that cannot be read" for what in (
+        "ranges", "lists of states", "offsets", "limits",
+    ))):  # fmt: skip
+        assert f"left out: {left_out} (1)" in said
 
 
 def test_what_is_described_twice_is_counted(sniff485: Run, tmp_path: Path) -> None:
