@@ -25,6 +25,7 @@ _SPACES = {
 }
 _SWAPS = {"none": (False, False), "byte": (False, True), "word": (True, False), "word_byte": (True, True)}
 _TEMPERATURES = (("address", "current temperature"), ("target_temp_register", "target temperature"))
+_HUGE = 1 << 64  # no number of a register, a station or a code; of thousands of digits none can even be written
 _LONGEST_LIST = 16  # registers of a climate's list of target temperatures
 
 
@@ -66,15 +67,19 @@ def _take(found: RegisterMap, part: str, thing: Mapping[str, Any]) -> None:
                 found.left_out[f"{key.replace('_', ' ')}s of climates"] += 1
         return
     states: dict[int, str] = {}
+    codes: dict[str, object] = {}
     access = Access.READ
     if part in ("switches", "lights", "fans"):
         access = Access.BOTH
-        for key, usual, words in (("command_on", 1, "on"), ("command_off", 0, "off")):
-            states.setdefault(_whole(thing.get(key, usual)) or 0, words)
+        codes = {"on": thing.get("command_on", 1), "off": thing.get("command_off", 0)}
     elif part == "covers":
         access = Access.BOTH
-        for key, usual in (("open", 1), ("closed", 0), ("opening", 2), ("closing", 3)):
-            states.setdefault(_whole(thing.get(f"state_{key}", usual)) or 0, key)
+        usual = (("open", 1), ("closed", 0), ("opening", 2), ("closing", 3))
+        codes = {key: thing.get(f"state_{key}", code) for key, code in usual}
+    for words, value in codes.items():
+        code = _whole(value)
+        if code is not None:
+            states.setdefault(code, words)
     _add(found, thing, thing.get("address"), _text(thing.get("name")), states, access, part)
 
 
@@ -140,13 +145,16 @@ def _kind(found: RegisterMap, thing: Mapping[str, Any], part: str, space: str) -
 
 
 def _text(value: object) -> str:
-    return value if isinstance(value, str) else "" if value is None else str(value)[:200]
+    """What a plain value says; nothing where it is a list, which names may make longer than memory."""
+    if isinstance(value, str):
+        return value
+    return str(value) if _whole(value) is not None or isinstance(value, bool | float) else ""
 
 
 def _whole(value: object) -> int | None:
     if isinstance(value, str) and value.isascii() and value.isdigit() and len(value) < 8:
         return int(value)
-    return value if isinstance(value, int) and not isinstance(value, bool) else None
+    return value if isinstance(value, int) and not isinstance(value, bool) and abs(value) < _HUGE else None
 
 
 def _real(value: object) -> float | None:

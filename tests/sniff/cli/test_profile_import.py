@@ -276,6 +276,24 @@ def test_any_text_gives_a_document_or_nothing(text: str, numbering: str) -> None
             assert len(parse_text(said, "some").entries) == count
 
 
+def test_values_that_nobody_can_write_down_are_none() -> None:
+    long = 1 << 20_000  # of YAML: as hexadecimal digits these can be read, and not be printed
+    laughs: list[object] = ["ha"]
+    for _ in range(60):
+        laughs = [laughs, laughs]  # as YAML's names for lists make it
+    things = [
+        {"name": long, "address": 1, "slave": long, "unit_of_measurement": [long], "scale": long},
+        {"name": laughs, "address": 2, "unit_of_measurement": laughs, "slave_count": long},
+        {"name": "far", "address": long},
+    ]
+    switch = {"name": "lamp", "address": 3, "command_on": long}
+    found = read_home_assistant({"modbus": [{"sensors": things, "switches": [switch]}]})
+    assert found is not None
+    profile = parse_text(document("some", "somewhere", found, "modbus", ["modbus-rtu"])[0], "some")
+    assert [entry.address for entry in profile.entries] == [1, 2, 3]
+    assert profile.entries[2].states == {0: "off"}
+
+
 plain_values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
     lambda inner: (
