@@ -6,11 +6,11 @@ Source: home-assistant.io, integrations/modbus: addresses are those of the wire;
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from itertools import islice
 from typing import Any
 
+from dissectors.profiles.checked import MOST
 from dissectors.profiles.model import Access, Kind
 from dissectors.register_maps import MOST_ENTRIES, Mapped, RegisterMap, kind_of
 
@@ -164,4 +164,4 @@ def _real(value: object) -> float | None:
         number = float(value)
     except OverflowError:
         return None
-    return number if math.isfinite(number) else None
+    return number if abs(number) < MOST else None

@@ -7,11 +7,11 @@ Numbers are read as 40001-style where all of them can be, else as those of the w
 from __future__ import annotations
 
 import csv
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from dissectors.profiles.checked import MOST
 from dissectors.profiles.model import Access, Kind
 from dissectors.register_maps import MOST_ENTRIES, Mapped, RegisterMap, kind_of, order_of
 
@@ -272,14 +272,11 @@ def _untold(space: str, registers: int | None) -> Kind:
 def _scale(found: RegisterMap, row: Mapping[str, str]) -> float:
     """raw · scale; a divisor is the same the other way round."""
     text, divisor = row.get("scale", ""), _decimal(row.get("divisor", ""))
-    scale = 1.0
-    if text not in _NOTHING:
-        known = _factor(text)
-        if known is None:
-            found.left_out["scales that cannot be read"] += 1
-        else:
-            scale = known
-    return scale / divisor if divisor else scale
+    scale = (1.0 if text in _NOTHING else _factor(text) or 0.0) / (divisor or 1.0)
+    if 0 < abs(scale) < MOST:
+        return scale
+    found.left_out["scales that cannot be read"] += 1
+    return 1.0
 
 
 def _factor(text: str) -> float | None:
@@ -298,7 +295,7 @@ def _decimal(text: str) -> float | None:
     if not re.fullmatch(r"[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d{1,2})?", text, re.IGNORECASE):
         return None
     value = float(text)
-    return value if math.isfinite(value) else None
+    return value if abs(value) < MOST else None
 
 
 def _range(row: Mapping[str, str]) -> tuple[float | None, float | None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-_MOST = 1e300
+MOST = 1e300
 _MOST_NUMBERS = 65536
 """No larger number, and no more numbers in a list, than anything of a device can need."""
 
@@ -45,7 +45,7 @@ class CheckedTable:
     def number(self, key: str, default: float | None = None) -> float:
         """A number."""
         value = self._value(key, default)
-        if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < _MOST:
+        if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < MOST:
             raise self.error(key, f"expected a number, not {value!r}")
         return float(value)
 
@@ -76,7 +76,7 @@ class CheckedTable:
         if value == ():
             return None, None
         good = isinstance(value, list) and len(value) == 2 and all(type(item) in (int, float) for item in value)
-        if not good or not -_MOST < value[0] <= value[1] < _MOST:
+        if not good or not -MOST < value[0] <= value[1] < MOST:
             raise self.error(key, f"expected [low, high], not {value!r}")
         return float(value[0]), float(value[1])
 

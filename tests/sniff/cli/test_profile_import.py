@@ -152,6 +152,17 @@ def test_what_cannot_be_read_is_counted(sniff485: Run, tmp_path: Path) -> None:
         assert f"left out: {left_out} (1)" in said
 
 
+def test_no_number_is_larger_than_a_profile_may_say() -> None:
+    little = "0." + 200 * "0" + "1"
+    found = read_csv(f"Register;Scale;Divisor;Offset\n1;1/{little};{little};1{301 * '0'}\n2;x;10;\n")
+    assert found is not None
+    assert [(one.scale, one.offset) for one in found.entries] == [(1, 0), (1, 0)]
+    assert found.left_out == {"scales that cannot be read": 2, "offsets that cannot be read": 1}
+    house = read_home_assistant({"modbus": [{"sensors": [{"address": 1, "scale": 1e300, "offset": -1e300}]}]})
+    assert house is not None
+    assert [(one.scale, one.offset) for one in house.entries] == [(1, 0)]
+
+
 def test_what_is_described_twice_is_counted(sniff485: Run, tmp_path: Path) -> None:
     text = "address,name,type\n0,a,u32\n1,b,u16\n2,a,u16\n70000,x,u16\n65535,y,u32\n"
     profile, said = imported(sniff485, tmp_path, text)
