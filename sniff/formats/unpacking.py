@@ -10,7 +10,7 @@ import bz2
 import lzma
 import tempfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -81,17 +81,17 @@ def gzip_pieces(stream: BinaryIO) -> Iterator[bytes]:
             if piece := unpacker.decompress(octets, _PIECE):
                 yield piece
             octets = unpacker.unconsumed_tail or (b"" if unpacker.eof else stream.read(_AT_ONCE))
-        octets = (unpacker.unused_data or stream.read(_AT_ONCE)).lstrip(b"\0")  # padding, as tapes have it
+        octets = _behind_padding(unpacker.unused_data, stream)
 
 
 def bzip2_pieces(stream: BinaryIO) -> Iterator[bytes]:
     """What a bzip2 file holds."""
-    yield from _stream_pieces(stream, bz2.BZ2Decompressor())
+    yield from _stream_pieces(stream, bz2.BZ2Decompressor)
 
 
 def xz_pieces(stream: BinaryIO) -> Iterator[bytes]:
     """What an xz file holds; one that wants more memory than `_WINDOW` is refused by its own library."""
-    yield from _stream_pieces(stream, lzma.LZMADecompressor(lzma.FORMAT_XZ, memlimit=_WINDOW))
+    yield from _stream_pieces(stream, lambda: lzma.LZMADecompressor(lzma.FORMAT_XZ, memlimit=_WINDOW))
 
 
 def zstd_pieces(stream: BinaryIO) -> Iterator[bytes]:
@@ -110,16 +110,32 @@ def zstd_pieces(stream: BinaryIO) -> Iterator[bytes]:
         octets = unpacker.unused_data or stream.read(_ZSTD_AT_ONCE)
 
 
-def _stream_pieces(stream: BinaryIO, unpacker: Any) -> Iterator[bytes]:
-    octets = b""
-    while not unpacker.eof:
-        if unpacker.needs_input:
-            octets = stream.read(_AT_ONCE)
-            if not octets:
-                raise EOFError("it ends within")
-        if piece := unpacker.decompress(octets, _PIECE):
-            yield piece
-        octets = b""
+def _stream_pieces(stream: BinaryIO, make: Callable[[], Any]) -> Iterator[bytes]:
+    """One stream after another: programs that pack with several processors make many."""
+    octets = stream.read(_AT_ONCE)
+    while octets:
+        unpacker = make()
+        while not unpacker.eof:
+            if unpacker.needs_input and not octets:
+                octets = stream.read(_AT_ONCE)
+                if not octets:
+                    raise EOFError("it ends within")
+            try:
+                piece = unpacker.decompress(octets, _PIECE)
+            except OSError as error:  # of bz2, for data that are none; the file was read
+                raise ValueError(str(error)) from None
+            if piece:
+                yield piece
+            octets = b""
+        octets = _behind_padding(unpacker.unused_data, stream)
+
+
+def _behind_padding(octets: bytes, stream: BinaryIO) -> bytes:
+    """What comes next, zeros aside, as tapes have them; empty at the end."""
+    octets = octets or stream.read(_AT_ONCE)
+    while octets and not octets.strip(b"\0"):
+        octets = stream.read(_AT_ONCE)
+    return octets.lstrip(b"\0")
 
 
 def _zstd_error() -> type[Exception]:

@@ -43,8 +43,9 @@ class ValueChanges:
         self._wires: dict[str, int] = {}
         self.channels: list[str] = []
         with open_capture(path) as stream:
-            self._header(self._words(stream))
-            self.levels = self._first_levels(stream)
+            words = self._words(stream)
+            self._header(words)
+            self.levels = self._first_levels(words)
         if not self.channels:
             raise CaptureError(f"{path}: no wire of one bit in it")
 
@@ -55,8 +56,9 @@ class ValueChanges:
         found: list[list[int]] = [[] for _ in self.channels]
         count, time = 0, -1
         with open_capture(self.path) as stream:
-            self._header(self._words(stream))
-            for word in self._words(stream):
+            words = self._words(stream)
+            self._header(words)
+            for word in words:
                 kind, name = word[0], word[1:]
                 if kind in "01":
                     wire = self._wires.get(name)
@@ -77,9 +79,16 @@ class ValueChanges:
         return self._complete
 
     def _words(self, stream: BinaryIO) -> Iterator[str]:
+        """All words; a line may be longer than what is read at once, and be cut in one of them."""
+        begun = ""
         try:
             while line := stream.readline(LONGEST_LINE):
-                yield from line.decode("ascii", "replace").split()
+                text = begun + line.decode("ascii", "replace")
+                words = text.split()
+                begun = words.pop() if words and not text[-1].isspace() and len(words[-1]) < LONGEST_LINE else ""
+                yield from words
+            if begun:
+                yield begun
         except OSError as error:
             raise explain(self.path, error) from None
 
@@ -108,11 +117,11 @@ class ValueChanges:
         self._scale = (number * NS_PER_S // unit, 1) if unit <= NS_PER_S else (number, unit // NS_PER_S)
         self.resolution = f"times in {match[1]} {match[2]}"
 
-    def _first_levels(self, stream: BinaryIO) -> list[int]:
+    def _first_levels(self, words: Iterator[str]) -> list[int]:
         """What the wires are before time goes on; idle where that is not said."""
         levels = [1] * len(self.channels)
         times = 0
-        for word in islice(self._words(stream), 16 * MOST_CHANNELS):
+        for word in islice(words, 16 * MOST_CHANNELS):
             times += word[0] == "#"
             if times > 1:
                 break

@@ -143,3 +143,24 @@ def test_the_output_of_a_terminal_is_text(around: str, tmp_path: Path) -> None:
     path = tmp_path / "typescript"
     path.write_text("".join(f"{around}10:00:0{at}.000 RX: 01 03 00 00 00 02 C4 0B\x1b[0m\r\n" for at in range(8)))
     assert [item.octets.hex() for item in read(path).items() if isinstance(item, Chunk)] == ["010300000002c40b"] * 8
+
+
+@pytest.mark.parametrize("packed", PACKERS)
+@pytest.mark.parametrize("padding", [0, 512, 70_000])
+def test_packed_files_of_several_streams(packed: str, padding: int, tmp_path: Path) -> None:
+    """As programs make them that pack with several processors, and tapes that fill up with zeros."""
+    if packed == ".zst" and padding:
+        return
+    made, path = written(tmp_path, ".cap.txt").read_bytes(), tmp_path / f"x.cap.txt{packed}"
+    pack = PACKERS[packed]
+    path.write_bytes(pack(made[:-30]) + bytes(padding) + pack(made[-30:]) + bytes(padding))
+    assert octets(read(path)) == octets(POLL)
+    assert read(path).completeness().whole
+
+
+@pytest.mark.parametrize("packed", PACKERS)
+def test_behind_a_packed_file_something_else(packed: str, tmp_path: Path) -> None:
+    path = tmp_path / f"x.cap.txt{packed}"
+    path.write_bytes(PACKERS[packed](written(tmp_path, ".cap.txt").read_bytes()) + b"something else")
+    assert octets(read(path)) == octets(POLL)
+    assert "damaged or cut" in read(path).completeness().text

@@ -16,7 +16,7 @@ from dissectors.frame import Chunk, LineError
 from dissectors.line import LineSettings
 from sniff.cli import main
 from sniff.engine.capture import Capture, CaptureError
-from sniff.formats import logic_capture, read
+from sniff.formats import logic_capture, read, vcd
 from sniff.formats.saleae import DigitalBinary, is_digital_csv
 from sniff.formats.several_buses import SeveralBuses, chosen
 from sniff.formats.uart import Decoder, Uart
@@ -357,3 +357,18 @@ def test_every_kind_is_told_by_its_content(tmp_path: Path, kind: str) -> None:
         moved = path.rename(tmp_path / name)
         assert _octets(read(moved)) == octets
         path = moved
+
+
+@pytest.mark.parametrize("longest", [1 << 16, 101])
+def test_a_value_change_dump_on_one_line(longest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """White space is all alike in it; a line may be longer than what is read at once, and be cut in a time."""
+    monkeypatch.setattr(vcd, "LONGEST_LINE", longest)
+    asked, answers = _polls(8)
+    path = as_vcd(tmp_path / "x.vcd", {"A": (1, edges_of(sorted([*asked, *answers]), RTU))})
+    several = _octets(read(path))
+    path.write_text(" ".join(path.read_text().split()))
+    assert (
+        _octets(read(path))
+        == several
+        == b"".join(some for pair in zip(asked, answers, strict=True) for _, some in pair)
+    )
