@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from dissectors.line import NS_PER_S
 from sniff.formats.network import NETWORK, Fragment, Segment, Snap, carried
 from sniff.formats.records import PacketRecord
 
 MOST_OPEN = 64
 """IP packets of which pieces are waited for; then the oldest is given up."""
 MOST_PIECES = 64
+PATIENCE = 60 * NS_PER_S
+"""ns that the pieces of a packet may lie apart (RFC 1122, 3.3.2); the same number is another packet's then."""
 LONGEST = 65_535
 """Octets of an IP packet."""
 
@@ -22,19 +25,21 @@ def carried_by(records: Iterable[PacketRecord]) -> Iterator[tuple[PacketRecord, 
     pieces = Pieces()
     for record in records:
         found = carried(record.link_type, record.data) if record.link_type in NETWORK else None
-        yield record, pieces.add(found) if isinstance(found, Fragment) else found
+        yield record, pieces.add(record.time, found) if isinstance(found, Fragment) else found
 
 
 class Pieces:
     """IP packets of which not all pieces have come. Bounded."""
 
     def __init__(self) -> None:
-        self._open: dict[_Key, list[Fragment]] = {}
+        self._open: dict[_Key, tuple[int, list[Fragment]]] = {}
 
-    def add(self, fragment: Fragment) -> Segment | None:
-        """Take a piece; what the packet carries, when it is whole by it."""
+    def add(self, time: int, fragment: Fragment) -> Segment | None:
+        """Take a piece that was captured at that time (ns); what the packet carries, when it is whole by it."""
         key = fragment.source, fragment.destination, fragment.packet, fragment.kind
-        held = self._open.setdefault(key, [])
+        if key in self._open and abs(time - self._open[key][0]) > PATIENCE:
+            del self._open[key]  # of an earlier packet of that number
+        _, held = self._open.setdefault(key, (time, []))
         held.append(fragment)
         octets = _whole(held)
         if octets is not None or len(held) >= MOST_PIECES:

@@ -17,7 +17,7 @@ APART = 10_000_000
 MOST_WAITING = 64
 
 Said = tuple[int, Address, bytes | int]
-"""ns, who said it, octets; a number stands for so many that are lost."""
+"""ns, who said it, octets; a number stands for so many that are lost, -1 for nobody knows how many."""
 
 
 class TcpOrder:

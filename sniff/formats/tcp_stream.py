@@ -8,6 +8,9 @@ from sniff.formats.network import Segment
 
 MOST_EARLY = 64
 """Segments that wait for one that is missing; then it is given up."""
+FARTHEST = 1 << 24
+"""Octets from what was given to a segment of the same connection, more than any window of a gateway; what lies farther
+is of another one, whose begin was not captured."""
 _HALF = 1 << 31
 
 
@@ -17,7 +20,8 @@ def ahead_of(sequence: int, other: int) -> int:
 
 
 class TcpStream:
-    """Fed segments as they were captured, gives payloads in order; a number stands for so many octets that are lost."""
+    """Fed segments as they were captured, gives payloads in order; a number stands for so many octets that are lost, -1
+    for nobody knows how many."""
 
     def __init__(self) -> None:
         self._next: int | None = None
@@ -32,6 +36,10 @@ class TcpStream:
             return
         if self._next is None:
             self._next = sequence
+        elif abs(self._ahead(sequence)) > FARTHEST:
+            yield from self.close()
+            self._next = sequence
+            yield -1
         yield from self._place(sequence, segment.payload, segment.lost)
         if len(self._early) > MOST_EARLY:
             yield from self.close()

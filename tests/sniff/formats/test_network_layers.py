@@ -9,9 +9,11 @@ from pathlib import Path
 import pytest
 
 from dissectors.frame import Chunk
+from dissectors.line import NS_PER_S
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.formats import read
-from sniff.formats.network_packets import MOST_OPEN
+from sniff.formats.network import Fragment
+from sniff.formats.network_packets import MOST_OPEN, Pieces
 from tests.sniff.formats.packets_made import CLIENT, SERVER, Packet, as_pcap
 from tests.sniff.formats.test_network_captures import MS, START, _sealed
 
@@ -109,3 +111,18 @@ def test_the_end_of_a_datagram_that_was_not_kept_is_a_hole(tmp_path: Path) -> No
     lost = [item for item in items if isinstance(item, LineEvent)]
     assert [(item.kind, item.count) for item in lost] == [(LineEventKind.DROPPED, 2)]
     assert sum(len(item.octets) for item in items if isinstance(item, Chunk)) == len(said) - 2
+
+
+def test_a_piece_of_another_packet_of_the_same_number_is_not_joined() -> None:
+    """Numbers of packets come again; a piece that was lost leaves the others waiting."""
+
+    def piece(at: int, octets: bytes, is_last: bool) -> Fragment:
+        return Fragment(b"\x0a\0\0\1", b"\x0a\0\0\2", 7, 17, at, is_last, octets)
+
+    pieces = Pieces()
+    head = bytes((0, 1, 0, 2, 0, 16, 0, 0))
+    assert pieces.add(0, piece(0, head + b"earlier.", False)) is None
+    assert pieces.add(100 * NS_PER_S, piece(0, head + b"newer...", False)) is None
+    whole = pieces.add(100 * NS_PER_S, piece(16, b"end", True))
+    assert whole is not None
+    assert whole.payload == b"newer...end"

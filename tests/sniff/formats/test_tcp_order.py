@@ -11,6 +11,7 @@ from dissectors.frame import Chunk
 from sniff.formats import read
 from sniff.formats.network import Address, Segment
 from sniff.formats.tcp_order import TcpOrder
+from sniff.formats.tcp_stream import TcpStream
 from tests.seeds import some
 from tests.sniff.formats.packets_made import CLIENT, PUSH, SERVER, as_pcap, tcp
 from tests.sniff.formats.test_network_captures import MS, START, _sealed
@@ -94,3 +95,15 @@ def test_an_answer_that_was_written_first_stands_behind_its_request(tmp_path: Pa
         said += request + answer
     capture = read(as_pcap(tmp_path / "mirrored.pcap", packets))
     assert b"".join(item.octets for item in capture.items() if isinstance(item, Chunk)) == said
+
+
+def test_a_connection_whose_begin_was_not_captured_is_not_the_one_before() -> None:
+    """Its octets are counted from another number, which may be lower: none of them came twice."""
+    stream = TcpStream()
+    found = [one for at in (5_000_000_000 % (1 << 32), 1_000, 1_003) for one in stream.add(_segment(at, b"abc"))]
+    assert found == [b"abc", -1, b"abc", b"abc"]
+    assert list(stream.close()) == []
+
+
+def _segment(sequence: int, payload: bytes) -> Segment:
+    return Segment(CLIENT, SERVER, payload, sequence)
