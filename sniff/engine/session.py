@@ -207,6 +207,7 @@ class Session:
     @classmethod
     def from_metadata(cls, record: Mapping[str, str]) -> Session:
         """Read what `to_metadata` wrote; total: what is missing or unreadable gets the default."""
+        record = {encodable(key): encodable(value) for key, value in record.items()}
         reports = record.get("adapter_reports", "unknown")
         try:
             line = LineSettings.parse(record.get("line", ""))
@@ -216,12 +217,12 @@ class Session:
             port=record.get("port", ""),
             line=line,
             protocol=record.get("protocol", registry.DEFAULT),
-            started=_integer(record.get("started_ns")),
+            started=_integer(record.get("started_ns"), -LATEST, LATEST),
             bus=record.get("bus", "bus"),
             adapter=Adapter(
                 name=record.get("adapter", "unknown"),
                 driver=record.get("adapter_driver", ""),
-                latency=min(max(0, _integer(record.get("adapter_latency_ns"))), MOST_LATENCY),
+                latency=_integer(record.get("adapter_latency_ns"), 0, MOST_LATENCY),
                 latency_from=record.get("adapter_latency_from", "assumed"),
                 reports=None if reports == "unknown" else tuple(name for name in reports.split(",") if name),
                 detail=record.get("adapter_detail", ""),
@@ -235,11 +236,20 @@ class Session:
         )
 
 
-def _integer(text: str | None) -> int:
+LATEST = (1 << 63) - 1
+"""ns since the epoch; what files of all kinds can say."""
+
+
+def _integer(text: str | None, least: int, most: int) -> int:
     try:
-        return int(text or 0)
+        return min(max(int(text or 0), least), most)
     except ValueError:
         return 0
+
+
+def encodable(text: str) -> str:
+    """A text that can be written into any file: half characters, as JSON may hold, become \\ud800."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 class LineEventKind(Enum):

@@ -25,6 +25,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
+from dissectors.findings import counted
 from dissectors.frame import Chunk
 from dissectors.line import MS
 from sniff.engine.capture import CaptureError
@@ -129,13 +130,16 @@ class ByteLog:
         if counts.strange:
             return Completeness(False, f"{self._strange_words()}, the first is line {counts.first} ({self.kind} log)")
         said = [f"{self.kind} log"]
-        said += [f"{counts.same} lines that repeat others passed over"] if counts.same else []
+        if counts.same:
+            repeats = "repeats" if counts.same == 1 else "repeat"
+            said.append(f"{counted(counts.same, 'line')} that {repeats} others passed over")
         if counts.completed:
-            said.append(f"{counts.completed} messages that the tool writes without their check completed with it")
+            many, whose = counted(counts.completed, "message"), "its" if counts.completed == 1 else "their"
+            said.append(f"{many} that the tool writes without {whose} check completed with it")
         if counts.unwrapped:
-            said.append(f"taken out of {counts.unwrapped} packets of a network")
+            said.append(f"taken out of {counted(counts.unwrapped, 'packet')} of a network")
         said += self._times_said()
-        said += [f"{counts.text} lines of other text passed over"] if counts.text else []
+        said += [f"{counted(counts.text, 'line')} of other text passed over"] if counts.text else []
         return Completeness(True, f"complete ({'; '.join(said)})")
 
     def _times_said(self) -> tuple[str, ...]:

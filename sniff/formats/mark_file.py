@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from sniff.engine.capture import Capture
-from sniff.engine.session import Completeness, Item, LineEvent, LineEventKind, Session
+from sniff.engine.session import Completeness, Item, LineEvent, LineEventKind, Session, encodable
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
@@ -63,7 +63,8 @@ def place_of(name: str, capture: Capture) -> MarkPlace | None:
 
 def add_mark(path: str | Path, time: int, text: str | None, bus: str = "") -> None:
     """Write a mark beside a capture, or that the one of that moment (ns) is taken away (None). Raises OSError."""
-    record: dict[str, Any] = {"time": time, "gone": True} if text is None else {"time": time, "text": text[:LONGEST]}
+    said = None if text is None else encodable(text[:LONGEST])
+    record: dict[str, Any] = {"time": time, "gone": True} if said is None else {"time": time, "text": said}
     if bus:
         record["bus"] = bus
     with mark_file(path).open("a", encoding="utf-8") as stream:
@@ -92,7 +93,7 @@ def marks_beside(path: str | Path, bus: str = "") -> list[LineEvent]:
         if record.get("gone"):
             found[time] = None  # which may be a mark that the capture holds itself
         elif isinstance(record.get("text"), str):
-            found[time] = record["text"][:LONGEST]
+            found[time] = encodable(record["text"][:LONGEST])
     return [mark_event(time, text) for time, text in sorted(found.items())]
 
 

@@ -40,6 +40,9 @@ SEEN_OF_NETWORK = 1000
 """Packets of a network or of USB before any serial frame, from which on it is a capture of such."""
 LATEST = (1 << 33) * 1_000_000_000
 """ns since the epoch, in the year 2242; a record that says more, or as much before it, is given this time."""
+LONGEST_OPTION = 60_000
+"""Octets of a text in an option, whose length has sixteen bits."""
+_SHORT = 200
 SESSION_MARK = "sniff485 session: "
 MARK = "mark: "
 """Begins a comment of a packet that a person wrote; what follows is theirs."""
@@ -166,7 +169,8 @@ class PcapngCapture:
 
     def _say_what_was_passed_over(self) -> None:
         if self._other and self._complete.whole:
-            self._complete = Completeness(True, f"complete; {self._other} records of other kinds were passed over")
+            were = "record of another kind was" if self._other == 1 else "records of other kinds were"
+            self._complete = Completeness(True, f"complete; {self._other} {were} passed over")
 
     def _pieces(self) -> Iterator[Item | Reads]:
         from sniff.formats.pcapng_walk import OtherBlock, PcapngWalk
@@ -331,11 +335,10 @@ class PcapngWriter:
         ]
         self._live = live
         self._file = NewFile(path)
-        about = SESSION_MARK + json.dumps(session.to_metadata())
-        section = struct.pack("<IHHq", BYTE_ORDER, 1, 0, -1) + _option(OPT_COMMENT, about.encode()) + _option(OPT_END)
+        section = struct.pack("<IHHq", BYTE_ORDER, 1, 0, -1) + self._about(session) + _option(OPT_END)
         self._block(SECTION, section)
         for number, name in ((link_type, session.bus), (USER1, f"{session.bus}: no frame")):
-            described = struct.pack("<HHI", number, 0, 0) + _option(OPT_NAME, name.encode())
+            described = struct.pack("<HHI", number, 0, 0) + _option(OPT_NAME, _fitting(name))
             self._block(INTERFACE, described + _option(OPT_TSRESOL, b"\x09") + _option(OPT_END))
         self._flush()
 
@@ -353,6 +356,16 @@ class PcapngWriter:
         """Give the file up."""
         self._file.discard()
 
+    def _about(self, session: Session) -> bytes:
+        """The option that holds the session, its notes only where there is room for them."""
+        record = session.to_metadata()
+        about = SESSION_MARK + json.dumps(record)
+        if len(about) > LONGEST_OPTION:
+            self.losses.append("notes of the session longer than pcapng can hold were left out")
+            record = {key: value[:_SHORT] for key, value in record.items() if not key.startswith("note_")}
+            about = SESSION_MARK + json.dumps(record)
+        return _option(OPT_COMMENT, about.encode())
+
     def _flush(self) -> None:
         if self._live:
             self._file.stream.flush()
@@ -362,9 +375,9 @@ class PcapngWriter:
         number = 1 if record.link_type == USER1 else 0
         options = _option(OPT_FLAGS, struct.pack("<I", CRC_ERROR_FLAG)) if record.crc_error else b""
         if record.comment:
-            options += _option(OPT_COMMENT, record.comment.encode()[:60_000])
+            options += _option(OPT_COMMENT, _fitting(record.comment))
         if record.mark is not None:
-            options += _option(OPT_COMMENT, f"{MARK}{record.mark}".encode()[:60_000])
+            options += _option(OPT_COMMENT, _fitting(f"{MARK}{record.mark}"))
         if record.searched is not None:
             options += _option(OPT_COMMENT, f"{SEARCH_MARK}{record.searched}".encode())
         head = struct.pack("<IIIII", number, time >> 32 & 0xFFFFFFFF, time & 0xFFFFFFFF, size, size)
@@ -374,6 +387,11 @@ class PcapngWriter:
     def _block(self, kind: int, body: bytes) -> None:
         size = struct.pack("<I", len(body) + 12)
         self._file.write(struct.pack("<I", kind) + size + body + size)
+
+
+def _fitting(text: str) -> bytes:
+    """A text as an option can hold it."""
+    return text.encode("utf-8", "backslashreplace")[:LONGEST_OPTION]
 
 
 def _option(code: int, value: bytes = b"") -> bytes:

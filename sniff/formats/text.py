@@ -43,6 +43,7 @@ from sniff.engine.capture import CaptureError
 from sniff.engine.session import (
     ASSUMED,
     DEVICES_NOTE,
+    LATEST,
     PROTOCOL_NOTE,
     Completeness,
     Item,
@@ -52,7 +53,7 @@ from sniff.engine.session import (
     settings_change,
 )
 from sniff.formats.files import NewFile, explain, open_capture
-from sniff.formats.text_line import DEVICE, EPOCH, HEADER, LATEST, MAGIC, MARKS, VERSION, Line, is_device, plain_chunk
+from sniff.formats.text_line import DEVICE, EPOCH, HEADER, MAGIC, MARKS, VERSION, Line, is_device, plain_chunk
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block

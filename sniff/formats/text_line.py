@@ -10,7 +10,7 @@ from typing import NoReturn
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import MS, LineSettings
 from sniff.engine.capture import CaptureError
-from sniff.engine.session import DEVICES_NOTE, LineEvent, LineEventKind
+from sniff.engine.session import DEVICES_NOTE, LATEST, LineEvent, LineEventKind, encodable
 
 MAGIC = "#!sniff-capture"
 VERSION = 1
@@ -38,8 +38,6 @@ DEVICE = "device"
 """Header key of its own, may stand more than once: `3=teco-e510`, or `*=teco-e510` for every station."""
 
 MARKS = {"P": LineError.PARITY, "F": LineError.FRAMING, "B": LineError.BREAK, "O": LineError.OVERRUN}
-
-LATEST = (1 << 63) - 1  # ns; what the other formats can hold
 
 _DELAY = re.compile(r"([+~-])([0-9]{1,15})(?:\.([0-9]{1,6}))?(?![0-9.])")
 _OCTETS = re.compile(r"[0-9A-Fa-f]{2}(?:[ \t]*[0-9A-Fa-f]{2})*(?![0-9A-Za-z])")
@@ -229,7 +227,7 @@ class Line:
             text = json.loads(value)
         except ValueError:
             self.expected("a JSON string", at)
-        return str(text)
+        return encodable(str(text))
 
     def event(self, last: int) -> LineEvent:
         begin = self.at

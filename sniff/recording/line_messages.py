@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from dissectors.frame import LineError, Mark
-from sniff.engine.session import LineEvent, LineEventKind
+from sniff.engine.session import LineEvent, LineEventKind, encodable
 from sniff.recording.topic_message import Message, stamp
 from sniff.recording.topics import LINE
 
@@ -92,7 +92,7 @@ class LineMessage:
         if kind is None:
             return None
         time, count = _integer(self._record.get("time_ns"), log_time), _integer(self._record.get("count"), 0)
-        return LineEvent(time, kind, text if isinstance(text, str) else "", count)
+        return LineEvent(time, kind, encodable(text) if isinstance(text, str) else "", count)
 
     def mark(self) -> Mark | None:
         """The mark that it is; None for what is no mark: a later version may know more kinds."""

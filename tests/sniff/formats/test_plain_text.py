@@ -57,3 +57,12 @@ def test_comments_alone_are_an_empty_text_capture(tmp_path: Path) -> None:
     path = tmp_path / "site.txt"
     path.write_text("# nothing yet\n")
     assert octets(read(path)) == b""
+
+
+@pytest.mark.parametrize(("others", "said"), [(1, "1 line of other text"), (2, "2 lines of other text")])
+def test_what_was_passed_over_is_counted_in_words(others: int, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    path.write_text("the port was opened\n" * others + "01 03 00 00 00 02 C4 0B\n01 03 04 00 D7 00 00 4B C5\n" * 4)
+    capture = read(path)
+    list(capture.items())
+    assert f"{said} passed over" in capture.completeness().text
