@@ -69,7 +69,7 @@ class Finding:
     under it. `stated`: the value behind the words, where whoever found it had one. `stations`: of what is found about
     the bus, the stations that it concerns; empty: everybody. `is_once`: it is said once of a capture and its count is
     no number of times. `is_told_apart`: its own words name a cause that no other finding tells, so that it stands for
-    itself (`Rule.told_by`).
+    itself (`Rule.told_by`). `lasts`: it stands as long as it is found, however long ago it was seen last.
     """
 
     code: str
@@ -87,6 +87,7 @@ class Finding:
     stations: tuple[int, ...] = ()
     is_once: bool = False
     is_told_apart: bool = False
+    lasts: bool = False
 
     @property
     def about(self) -> Subject:

@@ -329,8 +329,9 @@ class LineFindings:
             words = f"unplugged {times(self._unplugged.count)}"
             words += f", away for {self._away / NS_PER_S:.1f} s in all" if self._away else ""
             words += "; it did not come back" if self._unplugged_at is not None else ""
-            severity = Severity.ERROR if self._unplugged_at is not None else None
-            yield self._unplugged.found(RULES["LN006"], "adapter", words, severity)
+            is_away = self._unplugged_at is not None
+            finding = self._unplugged.found(RULES["LN006"], "adapter", words, Severity.ERROR if is_away else None)
+            yield replace(finding, lasts=is_away)
         if self._stepped.count:
             yield self._stepped.found(RULES["LN007"], "adapter", f"the clock stepped {times(self._stepped.count)}")
         if self._overruns.count:
@@ -403,7 +404,7 @@ class LineFindings:
             yield echoes
 
     def _whole(self, code: str, subject: str, words: str) -> Finding:
-        return found(RULES[code], subject, words, first=self._first, last=self._now)
+        return replace(found(RULES[code], subject, words, first=self._first, last=self._now), lasts=True)
 
     def _note_if(self, count: int, of: int) -> Severity | None:
         """A note where so few are not worth a warning."""

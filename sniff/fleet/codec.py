@@ -149,6 +149,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
         "stations": finding.stations,
         "is_once": finding.is_once,
         "is_told_apart": finding.is_told_apart,
+        "lasts": finding.lasts,
         "stated": _subject(finding.stated),
     }
 
@@ -162,6 +163,7 @@ def _finding_of(value: dict[str, Any]) -> Finding:
         stations=tuple(value["stations"]),
         is_once=value["is_once"],
         is_told_apart=value["is_told_apart"],
+        lasts=value["lasts"],
         stated=_subject_of(value["stated"]),
     )
 

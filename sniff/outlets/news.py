@@ -9,7 +9,7 @@ from enum import Enum
 from dissectors.findings import Finding, Severity, merged
 
 OVER_AFTER = 600_000_000_000
-"""ns without another occurrence after which a finding is over."""
+"""ns without another occurrence after which a finding is over, unless it lasts as long as it is found."""
 
 
 class NewsKind(Enum):
@@ -66,7 +66,7 @@ class NewsDesk:
 
     def _what(self, finding: Finding, now: int) -> NewsKind | None:
         known = self._known.get(finding.key)
-        over = now - finding.last > OVER_AFTER
+        over = not finding.lasts and now - finding.last > OVER_AFTER
         if known is None:
             self._known[finding.key] = _Known(finding, finding.severity, over)
             return None if over else NewsKind.NEW

@@ -145,7 +145,7 @@ class Teller:
         self._state(live, now, False, "ended")
 
     def _look(self, live: LiveBus, bus: _Bus, now: int) -> None:
-        news = bus.desk.look(live.model.findings(), now)
+        news = bus.desk.look(live.findings(), now)
         _tell(self.outlets, [FindingTold(bus.about, now, one) for one in news])
 
     def _state(self, live: LiveBus, now: int, listening: bool, text: str) -> None:

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from dissectors import registry
 from dissectors.findings import Finding, Severity
+from dissectors.line import LineSettings
+from sniff.analysis.judging import Judging
+from sniff.engine.session import LineEvent, LineEventKind, Session
 from sniff.outlets.news import OVER_AFTER, NewsDesk, NewsKind
 
 S = 1_000_000_000
@@ -37,6 +41,19 @@ def test_what_comes_back_and_becomes_as_grave_as_it_was_is_worse() -> None:
     ]
     told = [[one.what for one in desk.look([found], now)] for found, now in looks]
     assert told == [[NewsKind.NEW], [NewsKind.GONE], [NewsKind.NEW], [NewsKind.WORSE]]
+
+
+def test_what_lasts_is_not_over_for_that_nothing_new_is_heard_of_it() -> None:
+    """An hour without an octet, and without the adapter: until that is back."""
+    judging = Judging(Session("x", LineSettings(), "modbus-rtu"), registry.get("modbus-rtu"))
+    desk = NewsDesk(Severity.WARNING, 0)
+    judging.add_line_event(LineEvent(5 * S, LineEventKind.UNPLUGGED, "gone"))
+    assert {one.finding.code for one in desk.look(judging.findings(), 61 * S)} == {"LN002", "LN006"}
+    assert desk.look(judging.findings(), 3600 * S) == []
+    judging.add_line_event(LineEvent(3600 * S, LineEventKind.REPLUGGED, "back"))
+    assert [(one.what, one.finding.code) for one in desk.look(judging.findings(), 3601 * S)] == [
+        (NewsKind.GONE, "LN006")
+    ]
 
 
 def test_notes_and_consequences_are_nobodys_business() -> None:

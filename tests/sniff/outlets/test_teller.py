@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from types import SimpleNamespace
+
+import pytest
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
@@ -43,9 +46,9 @@ def read(at: int, value: int) -> list[Chunk]:
     ]
 
 
-def told(outlets: list[Heardall], messages: list) -> LiveBus:
-    link = GivenLink([*messages, Ended("done")])
-    link.clock = SimpleNamespace(now=lambda: 9000 * MS)  # type: ignore[attr-defined]
+def told(outlets: list[Heardall], messages: list, now: int = 9000) -> LiveBus:
+    link = GivenLink([*messages, Ended("done")], paths=["x"])
+    link.clock = SimpleNamespace(now=lambda: now * MS)  # type: ignore[attr-defined]
     link.line = LineSettings.parse("115200,8N1")
     live = LiveBus(link, watched=False)  # type: ignore[arg-type]
     Teller(outlets).attach(live)
@@ -93,6 +96,21 @@ def test_a_port_that_goes_and_comes_is_told_and_the_end_too() -> None:
     ]
     told([outlet], events)
     assert [one.listening for one in outlet.of(StateTold)] == [True, False, True, False]
+
+
+@pytest.mark.parametrize(("now", "codes"), [(9_000, set()), (90_000, {"LN002"})])
+def test_that_nothing_is_heard_is_told_when_somebody_has_listened_for_a_while(now: int, codes: set[str]) -> None:
+    outlet = Heardall()
+    messages: list = []
+    for turn in range(1, 9):
+        messages += [
+            ReceivedMessage(0, LineEvent(turn * 1000 * MS, LineEventKind.NOTE, "")),
+            Tick(0, turn * 1000 * MS),
+        ]
+    live = told([outlet], messages, now)
+    assert {one.news.finding.code for one in outlet.of(FindingTold)} - {"LN001"} == codes
+    assert {one[1] for one in live.link.told} >= {"/bus/bus0"}  # type: ignore[attr-defined]
+    assert {json.loads(one[5])["name"] for one in live.link.told if one[1] == "/findings"} - {"LN001"} == codes  # type: ignore[attr-defined]
 
 
 def test_what_goes_into_a_recording_is_the_same_with_a_listener() -> None:
