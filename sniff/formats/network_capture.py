@@ -134,6 +134,7 @@ def _datagram_reader(protocol: str) -> Reader:
             octets = _with_ends(segment, begin) if isinstance(segment, Segment) else None
             if octets:
                 yield Chunk(record.time, octets)
+                yield from _cut_off(record.time, segment.lost if isinstance(segment, Segment) else 0)
 
     return items
 
@@ -254,8 +255,7 @@ class _Both:
             return
         if segment.payload:
             yield Chunk(time, segment.payload)
-        if segment.lost:
-            yield LineEvent(time, LineEventKind.DROPPED, NOT_KEPT, segment.lost)
+        yield from _cut_off(time, segment.lost)
 
     def close(self, time: int) -> Iterator[Item]:
         """What waits for packets that were not captured."""
@@ -290,5 +290,11 @@ def _snap_reader(kind: bytes) -> Reader:
         for record, found in carried_by(records):
             if isinstance(found, Snap) and found.kind == kind and len(found.payload) > held.snap_header:
                 yield Chunk(record.time, held.snap_before + found.payload[held.snap_header :])
+                yield from _cut_off(record.time, record.cut)
 
     return items
+
+
+def _cut_off(time: int, lost: int) -> Iterator[LineEvent]:
+    if lost:
+        yield LineEvent(time, LineEventKind.DROPPED, NOT_KEPT, lost)

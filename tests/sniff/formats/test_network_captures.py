@@ -13,7 +13,7 @@ from dissectors.checksums import crc16_modbus, lrc
 from dissectors.frame import Chunk
 from sniff.cli import main
 from sniff.engine.capture import Capture, CaptureError
-from sniff.engine.session import LineEvent
+from sniff.engine.session import LineEvent, LineEventKind
 from sniff.formats import read
 from sniff.formats.linktypes import rtac_record
 from sniff.formats.several_buses import SeveralBuses
@@ -260,6 +260,24 @@ def test_frames_in_ethernet_snap(tmp_path: Path) -> None:
     assert (line.session.protocol, network.session.protocol) == ("mstp", "bacnet-ip")
     assert _octets(line) == _octets(read(folder / "derived_linktype165.pcap"))
     assert len([item for item in network.items() if isinstance(item, Chunk)]) == 68
+
+
+@pytest.mark.parametrize("in_snap", [False, True])
+def test_ends_of_frames_that_were_not_kept_are_holes(in_snap: bool, tmp_path: Path) -> None:
+    """Whatever carries one each."""
+    if in_snap:
+        whole = bytes(12) + bytes.fromhex("001f aaaa03 0010900001 000080 0001720000 84")
+    else:
+        told = bytes.fromhex("810a0017010030010c0c0000000119553e4441b800003f")
+        whole = udp((bytes((192, 0, 2, 1)), 47808), (bytes((192, 0, 2, 9)), 47808), told)
+    path = as_pcap(tmp_path / "x.pcap", [(START + at * 10 * MS, whole) for at in range(40)])
+    octets = bytearray(path.read_bytes())
+    kept = len(whole) - 3
+    at = len(octets) - len(whole)
+    octets[at - 8 : at - 4] = kept.to_bytes(4, "little")
+    path.write_bytes(octets[:-3])
+    items = [item for item in read(path).items() if isinstance(item, LineEvent)]
+    assert [(item.kind, item.count) for item in items] == [(LineEventKind.DROPPED, 3)]
 
 
 @pytest.mark.parametrize("link_type", [147, 148, 149, 155, 162])
