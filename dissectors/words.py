@@ -33,7 +33,10 @@ def duration(value: int) -> str:
 
 def exact_duration(value: float, unit: int) -> str:
     """A duration in ns as a bare number of units of so many ns, with all its digits: "8.2"."""
-    return f"{value / unit:.9f}".rstrip("0").rstrip(".")
+    if not isinstance(value, int):
+        return f"{value / unit:.9f}".rstrip("0").rstrip(".")
+    whole, part = divmod(abs(value), unit)  # of days in ms a float has not all digits
+    return f"{'-' if value < 0 else ''}{whole}.{part:0{len(str(unit)) - 1}}".rstrip("0").rstrip(".")
 
 
 def percent(share: float, places: int = 1) -> str:

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from dissectors.field_types import FieldType, Kind, plain_word
+from dissectors.line import MS
 from dissectors.manifest import Dissector
+from dissectors.words import exact_duration
 from sniff.filter import fields, told
 from sniff.filter.expressions import Expression
 from sniff.filter.grammar import FUNCTIONS, words_of
@@ -94,7 +96,7 @@ def shown_value(value: object, field: Expression) -> str:
     if isinstance(value, bytes):
         return value.hex(":") or '""'
     if type.kind is Kind.DURATION and isinstance(value, int):
-        return f"{value / 1e6:g}ms"
+        return f"{exact_duration(value, MS)}ms"
     if type.kind is Kind.TIME and isinstance(value, int):
         return f'"{datetime.fromtimestamp(value // 1_000_000_000, UTC):%H:%M:%S}"'
     word = next((word for word, number in type.words.items() if number == value), None)
