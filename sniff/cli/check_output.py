@@ -126,7 +126,7 @@ def _write_head(one: Checked, width: int) -> None:
         return
     print(f"{sanitized(one.source)}: {session.protocol_words}, {session.line_words}, {heard}")
     if one.note:
-        print(f"  incomplete: {one.note}")
+        print(f"  incomplete: {sanitized(one.note)}")
     if one.frames:
         _paragraph(f"health {one.health}", width, "  ", "    ")
         word = station_word(session.protocol)
@@ -160,7 +160,7 @@ def _write_finding(one: Checked, finding: Finding, width: int, colour: bool) -> 
     label = finding.severity.label.upper().ljust(8)
     if colour:
         label = f"\x1b[{_COLOURS[finding.severity]}m{label}\x1b[0m"
-    print(f"{label} {finding.subject}: {title}  [{finding.code}]")
+    print(f"{label} {sanitized(finding.subject)}: {title}  [{finding.code}]")
     _paragraph(sentence(finding.seen), width, _INDENT)
     for word, text in (("means", finding.means), ("next", finding.next)):
         if text and finding.severity > Severity.INFO:
@@ -187,7 +187,11 @@ def evidence(one: Checked, finding: Finding) -> str:
 
 def _paragraph(text: str, width: int, first: str, rest: str | None = None) -> None:
     lines = textwrap.wrap(
-        text, width, initial_indent=first, subsequent_indent=first if rest is None else rest, break_on_hyphens=False
+        sanitized(text),
+        width,
+        initial_indent=first,
+        subsequent_indent=first if rest is None else rest,
+        break_on_hyphens=False,
     )
     for line in lines:
         print(line)

@@ -12,6 +12,7 @@ from sniff.bus.capture_writer import create
 from sniff.cli import main
 from sniff.engine.session import Session
 from sniff.formats import read
+from sniff.recording.mcap_writer import PartPlace, create_part
 
 TITLE = "\x1b]0;title\x07\x9b2J\u202e"
 """What terminals obey: escapes, one octet or two, and what turns a line round."""
@@ -56,3 +57,19 @@ def test_what_convert_writes_show_reads(
     assert main(["convert", "ends.mcap", "ends.cap.txt"]) == 0
     assert main(["show", "ends.cap.txt"]) == 0
     assert [item.octets for item in read("ends.cap.txt").items() if isinstance(item, Chunk)] == [POLL]
+
+
+def test_nor_does_one_of_a_part_that_is_not_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    session = Session("p", LineSettings(19200, 8, "E", 1), "modbus-rtu", 10**18)
+    for part in (1, 2):
+        with create_part(f"a{TITLE}-{part}.mcap", [session], PartPlace(part, (part - 1,), (0,))) as writer:
+            writer.write(Chunk(10**18 + part, POLL))
+    last = Path(f"a{TITLE}-2.mcap")
+    last.write_bytes(last.read_bytes()[:-60])
+    main(["check", *map(str, sorted(Path().glob("*.mcap")))])
+    said = "".join(capsys.readouterr())
+    assert "incomplete: " in said
+    assert not {*"\x1b\x07\x9b\u202e"} & {*said}
