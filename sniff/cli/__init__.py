@@ -231,6 +231,7 @@ def _protocols() -> str:
 
 
 def _no_such_command(word: str) -> str:
+    import shlex
     from difflib import get_close_matches
 
     close = get_close_matches(word, COMMANDS, 1)
@@ -238,7 +239,7 @@ def _no_such_command(word: str) -> str:
         return f"{word!r}: no such command; did you mean {close[0]!r}?"
     if os.path.exists(word):
         a = "live" if word.startswith("/dev/") else "open"
-        return f"{word!r}: no such command; did you mean `sniff485 {a} {word}`?"
+        return f"{word!r}: no such command; did you mean `sniff485 {a} {shlex.quote(word)}`?"
     return f"{word!r}: no such command; `sniff485 --help` lists them"
 
 

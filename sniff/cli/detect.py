@@ -65,7 +65,7 @@ def of_file(args: argparse.Namespace) -> int:
             print(json_output.dumps(to_json(name, outcome)))
         else:
             of_several = "" if name == args.port else f" --bus {shlex.quote(sanitized(capture.session.bus))}"
-            write(name, outcome, told, f"open {sanitized(args.port)}{of_several}")
+            write(name, outcome, told, f"open {shlex.quote(sanitized(args.port))}{of_several}")
     return 0 if found else UNREADABLE
 
 
@@ -112,7 +112,7 @@ def write(port: str, outcome: Outcome, also: str = "", opened: str = "") -> None
     if opened:
         print(f"  next: sniff485 {opened} -p {reading.protocol}")
     else:
-        print(f"  next: sniff485 live {sanitized(port)} -s {reading.line} -p {reading.protocol}")
+        print(f"  next: sniff485 live {shlex.quote(sanitized(port))} -s {reading.line} -p {reading.protocol}")
 
 
 def _of_no_protocol(outcome: Outcome) -> str:

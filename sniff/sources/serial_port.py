@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import shlex
 from dataclasses import dataclass
 
 from dissectors.frame import Chunk
@@ -234,7 +235,9 @@ def refuse_unfit(device: str) -> None:
     if os.path.isdir(device):
         raise PortError(f"{device}: a folder, not a serial port; {_ports_there_are()}")
     if os.path.isfile(device):
-        raise PortError(f"{device}: a file, not a serial port; to read a capture use: sniff485 open {device}")
+        raise PortError(
+            f"{device}: a file, not a serial port; to read a capture use: sniff485 open {shlex.quote(device)}"
+        )
     if not is_tty(device):
         raise PortError(f"{device}: not a serial port; {_ports_there_are()}")
     if is_pty(device):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -45,3 +46,11 @@ def test_a_file_that_is_not_there_is_no_port_trouble(tmp_path: Path, sniff485: C
     ran = sniff485("detect", tmp_path / "night.mcap")
     assert (ran.code, ran.out) == (3, "")
     assert "no such file" in ran.err
+
+
+def test_the_next_command_can_be_typed_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "plant room; night.log"
+    path.write_text(LOG)
+    assert main(["detect", str(path)]) == 0
+    (line,) = [line for line in capsys.readouterr().out.splitlines() if "next: " in line]
+    assert shlex.split(line)[1:4] == ["sniff485", "open", str(path)]
