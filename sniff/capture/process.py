@@ -28,6 +28,7 @@ from sniff.recording.writer import Recorder, SharedFile
 from sniff.sources import PortError, Source, open_source
 from sniff.sources.capture_file import CaptureFileSource
 from sniff.sources.clock import Clock
+from sniff.sources.growing_recording import GrowingRecordingSource
 
 FAREWELL = 2.0
 """Seconds that the last message may wait for its reader."""
@@ -72,7 +73,7 @@ def _opened(spec: SourceSpec, clock: Clock) -> Source:
 
 def session_of(spec: SourceSpec, source: Source, clock: Clock) -> Session:
     """What is known of a bus at the start of its capture."""
-    started = source.session.started if isinstance(source, CaptureFileSource) else clock.wall
+    started = source.session.started if isinstance(source, CaptureFileSource | GrowingRecordingSource) else clock.wall
     return Session(
         spec.spec,
         spec.line,

@@ -48,6 +48,11 @@ class GrowingRecordingSource:
         self._closed = False
 
     @property
+    def session(self) -> Session:
+        """What the recording says of itself."""
+        return self._file.session
+
+    @property
     def session_adapter(self) -> Adapter:
         """The adapter that the recording is made with."""
         return self._file.session.adapter

@@ -7,11 +7,15 @@ from pathlib import Path
 import pytest
 
 from dissectors.line import LineSettings
+from sniff.capture.config import SourceSpec
+from sniff.capture.process import session_of
 from sniff.cli import main
-from sniff.engine.session import Item
+from sniff.engine.session import Item, Session
 from sniff.formats import read
 from sniff.recording.following import Following
+from sniff.recording.mcap_writer import create
 from sniff.sources import PortError, open_source
+from sniff.sources.clock import Clock
 
 CAPTURE = Path(__file__).parents[3] / "captures" / "rtu-noisy-ftdi.cap.txt"
 
@@ -59,3 +63,13 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     for name in ("x.mcap", "absent.mcap"):
         with pytest.raises(PortError, match=name):
             open_source(f"follow:{tmp_path / name}", LineSettings())
+
+
+def test_a_capture_of_it_began_when_the_recording_did(tmp_path: Path) -> None:
+    """Times since the begin are counted from there, not from when somebody looked."""
+    session = Session("/dev/ttyUSB0", LineSettings(), "modbus-rtu", 10**18)
+    with create(tmp_path / "night.mcap", session):
+        pass
+    clock = Clock.start()
+    spec = SourceSpec(f"follow:{tmp_path / 'night.mcap'}")
+    assert session_of(spec, open_source(spec.spec, spec.line, clock), clock).started == 10**18
