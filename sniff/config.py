@@ -70,6 +70,8 @@ BOX_KEYS = ("folder", "name", "rotate", "keep", "keep_free", "metrics", "status"
 VIEW_KEYS = ("frames", "transactions", "time", "filter")
 TIMES = ("absolute", "relative", "delta")
 TOP_KEYS = ("bus", "alert", "box", "filters", "colours", "view", "keys", *outlet_settings.TABLES)
+MOST_EVERY = 366 * 86_400
+"""Seconds between two alerts about the same; what is longer, or no number, is a mistake."""
 COLOURS = ("red", "green", "yellow", "blue", "magenta", "cyan")
 
 
@@ -287,7 +289,7 @@ class _Reader:
         if level not in levels:
             raise self.error("at", "alert", f"unknown severity {level!r}{nearest(level, tuple(levels))}")
         every = entry.get("every", 600)
-        if isinstance(every, bool) or not isinstance(every, int | float) or every < 0:
+        if isinstance(every, bool) or not isinstance(every, int | float) or not 0 <= every <= MOST_EVERY:
             raise self.error("every", "alert", f"expected seconds, not {every!r}")
         return AlertSettings(tuple(command), webhook, levels[level], float(every))
 

@@ -219,7 +219,9 @@ def _write_parquet(place: str, archive: Archive) -> None:
 def _day(word: str) -> int:
     """argparse type: the begin of a day of UTC, ns."""
     try:
-        return int(datetime.fromisoformat(word).replace(tzinfo=UTC).timestamp()) * 1_000_000_000
+        moment = datetime.fromisoformat(word)
+        told = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
+        return int(told.timestamp()) * 1_000_000_000
     except (ValueError, OverflowError):
         raise argparse.ArgumentTypeError(f"{word!r}: a day like 2026-01-31") from None
 

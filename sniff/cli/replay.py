@@ -30,7 +30,8 @@ def run(args: argparse.Namespace) -> int:
     if not args.speed > 0:
         raise Failure(f"--speed {args.speed}: expected more than 0", USAGE)
     kind, _, number = args.to.partition(":")
-    if kind not in {"pty", "tcp"} or (number and (kind == "pty" or not number.isdigit() or int(number) > 65535)):
+    is_number = number.isascii() and number.isdigit() and len(number) < 6 and int(number) < 1 << 16
+    if kind not in {"pty", "tcp"} or (number and (kind == "pty" or not is_number)):
         raise Failure(
             f"--to {args.to}: refused; a capture is only played to pty, tcp or tcp:PORT, never to a port", USAGE
         )

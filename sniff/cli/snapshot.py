@@ -43,6 +43,8 @@ def run(args: argparse.Namespace) -> int:
                 print(f"{sanitized(place)}: written")
         except OSError as error:
             raise Failure(f"{place}: {error.strerror}", UNREADABLE) from None
+        except UnicodeDecodeError:
+            raise Failure(f"{place}: not in UTF-8, so nothing that was written here; remove it", UNREADABLE) from None
         except CaptureError as error:
             raise Failure(str(error), UNREADABLE) from None
         if args.check and expected != found:

@@ -157,7 +157,8 @@ def refuse_recording(path: str) -> None:
 
 def new_recording(bus: str) -> str:
     """A name in this folder that no file has: sniff485-<bus>-<date>-<time>.mcap."""
-    stem = f"sniff485-{bus}-{time.strftime('%Y%m%d-%H%M%S')}"
+    name = re.sub(r'[\x00-\x1f\x7f\\/:*?"<>|]+', "-", bus)  # of the configuration: what no file may be called
+    stem = f"sniff485-{name}-{time.strftime('%Y%m%d-%H%M%S')}"
     path, number = Path(f"{stem}.mcap"), 2
     while path.exists():
         path, number = Path(f"{stem}-{number}.mcap"), number + 1

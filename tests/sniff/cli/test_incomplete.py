@@ -7,7 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from sniff.cli import main
 from tests.sniff.cli.conftest import Ran
+
+CAPTURES = Path(__file__).parents[3] / "captures"
 
 
 @pytest.fixture
@@ -48,3 +51,11 @@ def test_a_folder_is_no_capture_and_no_missing_file(tmp_path: Path, sniff485: Ca
     assert ran.code == 3
     assert "a directory, not a capture" in ran.err
     assert "no such file" in sniff485("check", tmp_path / "none").err
+
+
+def test_an_expectation_that_is_no_text_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    capture = tmp_path / "poll.cap.txt"
+    capture.write_bytes((CAPTURES / "rtu-clean.cap.txt").read_bytes())
+    (tmp_path / "poll.expect.txt").write_bytes(b"\xff\xfe")
+    assert main(["snapshot", "--check", str(capture)]) == 3
+    assert "not in UTF-8" in capsys.readouterr().err

@@ -14,3 +14,9 @@ def test_a_port_that_cannot_be_is_said(command: list[str], port: str, capsys: py
         main([*command, port])
     assert ended.value.code == 2
     assert "expected a port, 0 to 65535" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("port", ["65536", "²", "1" * 5000])
+def test_one_that_a_replay_cannot_listen_at_is_said(port: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", "x.mcap", "--to", f"tcp:{port}"]) == 2
+    assert "refused" in capsys.readouterr().err

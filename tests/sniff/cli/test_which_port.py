@@ -63,3 +63,7 @@ def test_no_port_at_all_is_a_failure(folder: Path, monkeypatch: pytest.MonkeyPat
 def test_the_name_of_a_recording_says_the_port(folder: Path, port: str, name: str) -> None:
     assert target(port).source.bus == name
     assert targets.new_recording(name).startswith(f"sniff485-{name}-")
+
+
+def test_a_bus_may_be_called_what_no_file_can_be() -> None:
+    assert targets.new_recording("north/boiler: 1").startswith("sniff485-north-boiler- 1-")

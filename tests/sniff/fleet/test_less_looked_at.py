@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from sniff.cli import main
+from sniff.cli import fleet, main
 
 ILL = Path(__file__).parents[3] / "captures" / "rtu-usual-faults.cap.txt"
 
@@ -32,3 +32,11 @@ def test_what_was_not_looked_at_is_neither_gone_nor_new(tmp_path: Path, capsys: 
     findings = [one for bus in again for one in bus.get("findings", ())]  # type: ignore[attr-defined]
     assert findings
     assert {one["since_last_run"] for one in findings} == {"stays"}
+
+
+@pytest.mark.parametrize(
+    ("word", "hours"),
+    [("2026-01-02", 0), ("2026-01-02T02:00+02:00", 0), ("2026-01-02T02:00", 2), ("2026-01-02T02Z", 2)],
+)
+def test_a_zone_that_is_said_counts(word: str, hours: int) -> None:
+    assert fleet._day(word) == 1_767_312_000_000_000_000 + hours * 3600 * 10**9

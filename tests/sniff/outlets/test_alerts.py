@@ -139,6 +139,8 @@ def test_a_command_that_fails_is_said(words: tuple[str, ...], said: str, monkeyp
         ('command = "mail"', "expected a list of words"),
         ('webhook = "http://x"\nat = "eror"', "error"),
         ('webhook = "http://x"\nevery = "1h"', "expected seconds"),
+        ('webhook = "http://x"\nevery = nan', "expected seconds"),
+        ('webhook = "http://x"\nevery = inf', "expected seconds"),
         ('webhok = "http://x"', "webhook"),
     ],
 )
