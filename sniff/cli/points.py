@@ -203,15 +203,16 @@ def _latest_of(args: argparse.Namespace, capture: Capture, session: Session) -> 
     from sniff.analysis.point_columns import add_to
 
     devices, dissector = arguments.noted_devices(args, session), dissector_for(session)
-    points, end = PointTable(), 0
+    points, end = PointTable(), None
     guessing = None if args.no_guess else Guessing(dissector, devices)
     for samples in _samples(args, capture, session, devices):
         if guessing is not None:
             guessing.add(samples)
         samples = _wanted(args, samples)
         add_to(points, samples)
-        end = max(end, samples.last or 0)
-    return _latest_rows(args, points, guessing, end)
+        last = samples.last
+        end = last if end is None or (last is not None and last > end) else end
+    return _latest_rows(args, points, guessing, end or 0)
 
 
 def _latest_rows(

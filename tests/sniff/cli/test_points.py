@@ -12,7 +12,10 @@ from typing import Any
 import pytest
 
 from dissectors.modbus.envelope import seal_rtu
+from sniff.cli import main
 from tests.sniff.cli.test_profile_draft import meter
+
+CAPTURES = Path(__file__).parents[3] / "captures"
 
 EXCHANGES = (
     ("010625021770", "010625021770"),
@@ -248,3 +251,13 @@ def test_orders_of_the_table(sniff485: Run, drive: Path, order: str) -> None:
         assert [row["samples"] for row in rows] == sorted((row["samples"] for row in rows), reverse=True)
     if order == "name":
         assert [row["point"] for row in rows] == sorted(row["point"] for row in rows)
+
+
+def test_ages_of_a_capture_from_before_1970(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    told = []
+    for year in ("2026", "1931"):
+        path = tmp_path / f"{year}.cap.txt"
+        path.write_text((CAPTURES / "rtu-clean.cap.txt").read_text().replace("start: 2026-", f"start: {year}-"))
+        assert main(["points", str(path), "--latest", "--csv"]) == 0
+        told.append(capsys.readouterr().out)
+    assert told[0] == told[1]
