@@ -215,7 +215,8 @@ def _pandas(columns: Columns, octets: dict[str, Sequence[bytes]]) -> Any:
         if column.form is ColumnForm.TEXT:
             return pd.Categorical.from_codes(np.where(missing, -1, column.values), list(column.texts))
         if column.form is ColumnForm.TIME:
-            return pd.DatetimeIndex(column.values.view("M8[ns]"), tz="UTC")
+            told = np.where(missing, np.datetime64("NaT", "ns"), column.values.view("M8[ns]"))
+            return pd.DatetimeIndex(told, tz="UTC")
         if column.missing is None:
             return column.values
         array = {

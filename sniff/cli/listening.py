@@ -221,13 +221,15 @@ def say_end(printers: Sequence[Printer]) -> None:
 def _say_counts(printer: Printer, bus: str) -> None:
     summary = printer.summary
     noise = f", {counted(summary.noise, 'octet')} of noise" if summary.noise else ""
-    searched = f", {summary.searched} octets heard while searching" if summary.searched else ""
+    searched = f", {counted(summary.searched, 'octet')} heard while searching" if summary.searched else ""
+    has_times = printer.live.session.has_times  # a file that stands in for a port may have none
+    load = f", bus load {summary.load.overall():.1%}" if has_times else ""
     print(
-        f"sniff485: {bus}{summary.frames} frames ({summary.damaged} damaged), {summary.octets} octets{noise}"
-        f"{searched}, bus load {summary.load.overall():.1%}",
+        f"sniff485: {bus}{counted(summary.frames, 'frame')} ({summary.damaged} damaged), "
+        f"{counted(summary.octets, 'octet')}{noise}{searched}{load}",
         file=sys.stderr,
     )
-    if summary.latency.count:
+    if summary.latency.count and has_times:
         middle, most = summary.latency.quantile(0.5), summary.latency.most
         assert middle is not None
         assert most is not None
@@ -244,12 +246,15 @@ def say_recorded(live: LiveBus, where: bool = True, bus: str = "") -> None:
     status, ended = live.status, live.ended
     if live.unseen:
         kept = "; the recording has them" if live.link.paths else ""
-        print(f"sniff485: {bus}{live.unseen} octets not looked at: this host did not keep up{kept}", file=sys.stderr)
+        print(
+            f"sniff485: {bus}{counted(live.unseen, 'octet')} not looked at: this host did not keep up{kept}",
+            file=sys.stderr,
+        )
     if ended is not None and ended.unheard:
         what = "the last octets were not looked at, nobody knows how many: this host was too slow for them"
         print(f"sniff485: {what}{'; the recording has them' if live.link.paths else ''}", file=sys.stderr)
     if status.omitted:
-        print(f"sniff485: {bus}{status.omitted} octets not kept: no trigger asked for them", file=sys.stderr)
+        print(f"sniff485: {bus}{counted(status.omitted, 'octet')} not kept: no trigger asked for them", file=sys.stderr)
     say_lost(live, bus)
     if live.file_is_gone:
         print(f"sniff485: {sanitized(status.path or live.link.paths[0])} is not there any more", file=sys.stderr)
@@ -264,10 +269,13 @@ def say_lost(live: LiveBus, bus: str = "") -> None:
     lost = status.lost
     if ended is not None and not ended.clean and status.unwritten:
         lost += status.unwritten
-        print(f"sniff485: {bus}about {lost} octets NOT RECORDED: the capture process was ended", file=sys.stderr)
+        print(
+            f"sniff485: {bus}about {counted(lost, 'octet')} NOT RECORDED: the capture process was ended",
+            file=sys.stderr,
+        )
     elif lost:
         why = "" if status.error else _why_lost(status)
-        print(f"sniff485: {bus}{lost} octets NOT RECORDED{why}", file=sys.stderr)
+        print(f"sniff485: {bus}{counted(lost, 'octet')} NOT RECORDED{why}", file=sys.stderr)
 
 
 def _why_lost(status: Status) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dissectors.findings import counted
 from sniff.engine.session import Completeness
 from sniff.formats.text import iso
 from sniff.recording.joiner import Joiner
@@ -16,17 +17,17 @@ def completeness_of(one: MessagePass, joiner: Joiner) -> Completeness:
         when = f"last chunk read at {iso(one.last)}" if one.last is not None else "no chunk in it"
         said.append(f"cut at octet {report.end} of {report.size}, or still being written; {when}")
         if report.size > report.end:
-            said.append(f"{report.size - report.end} octets of the file behind that cannot be read")
+            said.append(f"{counted(report.size - report.end, 'octet')} of the file behind that cannot be read")
     said.extend(report.problems)
     if report.places > len(report.problems):
-        said.append(f"{report.places - len(report.problems)} more such places")
+        said.append(f"{counted(report.places - len(report.problems), 'more such place')}")
     if report.skipped:
-        said.append(f"{report.skipped} octets of the file passed over")
-    for count, words in (
-        (joiner.missing, "reads missing in the numbering"),
-        (joiner.backward, "batches numbered backwards"),
-        (joiner.strange, "messages on /line that belong to nothing"),
+        said.append(f"{counted(report.skipped, 'octet')} of the file passed over")
+    for count, one_of, several, words in (
+        (joiner.missing, "read", "reads", "missing in the numbering"),
+        (joiner.backward, "batch", "batches", "numbered backwards"),
+        (joiner.strange, "message", "messages", f"on /line that belong{'s' * (joiner.strange == 1)} to nothing"),
     ):
         if count:
-            said.append(f"{count} {words}")
+            said.append(f"{counted(count, one_of, several)} {words}")
     return Completeness(not said, "; ".join(said) if said else "complete")

@@ -12,15 +12,18 @@ import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 import sniff
 from dissectors import registry
 from dissectors.line import LineSettings
+from sniff import data_frames
 from sniff.bus.capture_writer import create
-from sniff.bus.columns import FRAMES, TRANSACTIONS
+from sniff.bus.columns import FRAMES, TRANSACTIONS, Column, ColumnForm
 from sniff.bus.offline import outputs
 from sniff.bus.sample_row import COLUMNS
 from sniff.cli import main
@@ -250,3 +253,17 @@ def test_a_bus_of_several_is_named(tmp_path: Path) -> None:
         sniff.read(site)
     with pytest.raises(CaptureError, match="no bus 'attic' in it"):
         sniff.read(site, bus="attic")
+
+
+def test_pandas_has_no_instant_where_nobody_knows_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With what of pandas is asked for, so that it need not be there."""
+    told: dict[str, Any] = {}
+    pandas = SimpleNamespace(
+        DataFrame=told.update,
+        DatetimeIndex=lambda values, tz: values,
+        arrays=SimpleNamespace(IntegerArray=None, FloatingArray=None, BooleanArray=None),
+    )
+    monkeypatch.setitem(sys.modules, "pandas", pandas)
+    column = Column(ColumnForm.TIME, np.array([5, 0], np.int64), np.array([False, True]))
+    data_frames._pandas({"t": column}, {})
+    assert np.isnat(told["t"]).tolist() == [False, True]
