@@ -145,4 +145,4 @@ class LostTogether:
             seen += f"; they were back after {(max(back) - moment) / NS_PER_S:.1f} s"
         severity = Severity.WARNING if back else Severity.ERROR
         finding = tally.found(RULES["LN305"], "bus", seen, severity)
-        return replace(finding, count=len(names), stations=tuple(names))
+        return replace(finding, count=len(names), stations=tuple(names), lasts=len(back) < len(together))

@@ -38,3 +38,17 @@ def test_three_in_a_sixth_of_the_time_are_lost_together() -> None:
 def test_two_in_a_sixth_of_the_time_may_be_chance() -> None:
     assert lost({1: 5, 2: 5}, 9) == []
     assert lost({1: 5, 2: 5}, 40) == [(1, 2)]
+
+
+def test_what_is_lost_lasts_until_all_of_them_are_back() -> None:
+    together = LostTogether()
+    for second in range(60):
+        for station in (1, 2, 3):
+            together.settle(asked(station, second + station / 10, station == 3 or second < 30))
+    (finding,) = together.findings(0, 60 * S)
+    assert finding.last == 30 * S + S // 10
+    assert finding.lasts
+    for station in (1, 2):
+        together.settle(asked(station, 60 + station / 10, answered=True))
+        (finding,) = together.findings(0, 61 * S)
+        assert finding.lasts is (station == 1)
