@@ -55,18 +55,28 @@ class NewsDesk:
 
     def look(self, findings: Iterable[Finding], now: int) -> list[News]:
         """What is to be told at `now` (ns on the capture's clock) of all that is found by then."""
-        told_with_causes = [one for one in findings if one.cause is None]
-        found = {one.key: one for one in merged([told_with_causes]) if one.severity >= self._least}
-        told = [self._rationed(self._what(one, now), one, now) for one in found.values()]
+        own: list[Finding] = []
+        going_on: dict[tuple[str, str], int] = {}  # until when what a finding explains was seen
+        for one in findings:
+            if one.cause is None:
+                own.append(one)
+            else:
+                going_on[one.cause] = max(one.last, going_on.get(one.cause, one.last))
+        found = {one.key: one for one in merged([own]) if one.severity >= self._least}
+        told = [
+            self._rationed(self._what(one, max(one.last, going_on.get(one.key, one.last)), now), one, now)
+            for one in found.values()
+        ]
         for key, known in self._known.items():
             if key not in found:
                 was_over, known.is_over = known.is_over, True
                 told.append(self._rationed(None if was_over else NewsKind.GONE, known.finding, now))
         return [news for news in told if news is not None]
 
-    def _what(self, finding: Finding, now: int) -> NewsKind | None:
+    def _what(self, finding: Finding, last: int, now: int) -> NewsKind | None:
+        """`last`: when it, or what comes of it, was seen last."""
         known = self._known.get(finding.key)
-        over = not finding.lasts and now - finding.last > OVER_AFTER
+        over = not finding.lasts and now - last > OVER_AFTER
         if known is None:
             self._known[finding.key] = _Known(finding, finding.severity, over)
             return None if over else NewsKind.NEW

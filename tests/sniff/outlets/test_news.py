@@ -56,6 +56,14 @@ def test_what_lasts_is_not_over_for_that_nothing_new_is_heard_of_it() -> None:
     ]
 
 
+def test_what_explains_what_goes_on_is_not_over() -> None:
+    desk = NewsDesk(Severity.WARNING, 0)
+    under = replace(FOUND, code="MB104", severity=Severity.NOTE, cause=FOUND.key, last=900 * S)
+    assert [one.what for one in desk.look([FOUND], 11 * S)] == [NewsKind.NEW]
+    assert desk.look([FOUND, under], 900 * S) == []
+    assert [one.what for one in desk.look([FOUND, under], 900 * S + OVER_AFTER + 1)] == [NewsKind.GONE]
+
+
 def test_notes_and_consequences_are_nobodys_business() -> None:
     desk = NewsDesk(Severity.WARNING, 0)
     assert desk.look([replace(FOUND, severity=Severity.NOTE)], 11 * S) == []
