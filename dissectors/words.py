@@ -1,10 +1,11 @@
-"""Durations and shares in words, the same everywhere: in lists, and where they are compared with a limit."""
+"""Durations, numbers and shares in words, the same everywhere: in lists, and where they are compared with a limit."""
 
 from __future__ import annotations
 
 from dissectors.line import MS, NS_PER_S
 
 _MINUTES_FROM = 300 * NS_PER_S
+_EXACT = 1 << 53
 
 
 def milliseconds(value: int) -> str:
@@ -37,6 +38,12 @@ def exact_duration(value: float, unit: int) -> str:
         return f"{value / unit:.9f}".rstrip("0").rstrip(".")
     whole, part = divmod(abs(value), unit)  # of days in ms a float has not all digits
     return f"{'-' if value < 0 else ''}{whole}.{part:0{len(str(unit)) - 1}}".rstrip("0").rstrip(".")
+
+
+def brief(value: float, most: int) -> str:
+    """A number in `most` digits; of whole and of larger ones all before the point, never as a power of ten."""
+    is_whole = float(value).is_integer() and abs(value) < _EXACT
+    return f"{value:.0f}" if is_whole or abs(value) >= 10 ** (most - 1) else f"{value:.{most}g}"
 
 
 def percent(share: float, places: int = 1) -> str:

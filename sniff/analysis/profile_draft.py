@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from dissectors.findings import counted
 from dissectors.profiles.decoding import number, plain_name
 from dissectors.profiles.model import Kind
+from dissectors.words import brief
 from sniff.analysis.register_guess import RegisterGuess
 from sniff.analysis.register_kinds import GuessSureness, Use
 
@@ -55,7 +56,7 @@ def told(guess: RegisterGuess) -> str:
         span = f"always {number(guess.low)}"
     else:
         span = f"{number(guess.low)} … {number(guess.high)}, {counted(guess.changes, 'change')}"
-        span += f", {guess.rate:.3g} a second"
+        span += f", {brief(guess.rate, 3)} a second"
     return f"{_HOW[guess.sure]}; {_USES[guess.use]}; {span} in {counted(guess.answers, 'answer')}"
 
 

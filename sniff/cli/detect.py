@@ -12,6 +12,7 @@ import shlex
 from dataclasses import replace
 
 from dissectors import registry
+from dissectors.words import percent
 from sniff.analysis.autodetect import Candidature, Ending, Outcome, sureness
 from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.told_protocol import Sureness, detected, told_by
@@ -125,8 +126,8 @@ def evidence(reading: Candidature) -> str:
     """Why it is believed."""
     frames = "1 good frame holds" if reading.frames == 1 else f"{reading.frames} good frames hold"
     return (
-        f"{frames} {reading.covered:.0%} of {reading.octets} octets; {sureness(reading)}"
-        f"{f'; {reading.marked:.0%} of the octets came with line errors' if reading.marked else ''}"
+        f"{frames} {percent(reading.covered, 0)} of {reading.octets} octets; {sureness(reading)}"
+        f"{f'; {percent(reading.marked, 0)} of the octets came with line errors' if reading.marked else ''}"
     )
 
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from dissectors.line import MS, NS_PER_S
 from dissectors.profiles import Devices
 from dissectors.profiles.decoding import Quality, number
+from dissectors.words import brief
 from sniff.analysis.point_reader import PointReader, Sample
 from sniff.analysis.points import Point, PointTable
 from sniff.analysis.sanitizing import sanitized
@@ -319,7 +320,7 @@ def _brief(value: float | None, style: str) -> Cell:
     """Whole numbers with all their digits, others with five."""
     if value is None or style != "text":
         return value
-    return number(value) if value.is_integer() else f"{value:.5g}"
+    return brief(value, 5)
 
 
 def _by_device(point: Point) -> tuple[float, ...]:

@@ -14,6 +14,7 @@ from typing import Final
 from dissectors import registry
 from dissectors.frame import Chunk
 from dissectors.line import MS, NS_PER_S, LineSettings, Timing
+from dissectors.words import brief
 from sniff.engine.read_times import ReadTimes, held_back
 
 DEVICES_NOTE = "devices"
@@ -137,7 +138,7 @@ class Session:
             else f"{INFERRED}, whose times are multiples of {told.latency / MS:g} ms"
         )
         if is_named:
-            why += f", which hold more octets than {said.latency / MS:.3g} ms ({said.latency_from}) allow"
+            why += f", which hold more octets than {brief(said.latency / MS, 3)} ms ({said.latency_from}) allow"
         return replace(self, adapter=replace(said, latency=told.latency, latency_from=why), said=said)
 
     @property

@@ -1,10 +1,44 @@
-"""Shares and names in words."""
+"""Numbers, durations and shares as people read them."""
 
 from __future__ import annotations
 
+import pytest
+
+from dissectors.line import MS, NS_PER_S
 from dissectors.modbus.finding_words import share_words
 from dissectors.register_maps import Mapped, RegisterMap, document
-from dissectors.words import percent
+from dissectors.words import brief, exact_duration, percent
+
+
+@pytest.mark.parametrize(
+    ("value", "most", "said"),
+    [
+        (4_294_967_295, 5, "4294967295"), (12_345_678.0, 5, "12345678"), (123_456.789, 5, "123457"), (150.4, 2, "150"),
+        (99_999.7, 5, "100000"), (1234.5, 3, "1234"), (0.12345, 3, "0.123"), (-65_536.0, 3, "-65536"), (0, 3, "0"),
+        (1e300, 3, f"{1e300:.0f}"), (float("inf"), 3, "inf"), (float("nan"), 3, "nan"),
+    ],
+)  # fmt: skip
+def test_no_number_is_a_power_of_ten(value: float, most: int, said: str) -> None:
+    assert brief(value, most) == said
+
+
+@pytest.mark.parametrize(
+    ("share", "places", "said"),
+    [
+        (1, 0, "100%"), (0.9996, 0, "over 99%"), (0.9999, 1, "over 99.9%"), (0.5, 0, "50%"), (0, 2, "0.00%"),
+        (1e-7, 2, "under 0.01%"), (0.004, 0, "under 1%"), (0.006, 0, "1%"),
+    ],
+)  # fmt: skip
+def test_some_is_not_none_and_not_all(share: float, places: int, said: str) -> None:
+    assert percent(share, places) == said
+
+
+def test_a_duration_in_words_is_exact() -> None:
+    assert exact_duration(86_400_123_456_789, MS) == "86400123.456789"
+    assert exact_duration(-1_500_000_000, NS_PER_S) == "-1.5"
+    assert exact_duration(1500.5, MS) == "0.0015005"
+    assert exact_duration(0, MS) == "0"
+    assert exact_duration(20 * MS, MS) == "20"
 
 
 def test_some_is_not_none_and_nearly_all_is_not_all() -> None:

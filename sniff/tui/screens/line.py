@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import ClassVar
 
 from rich.table import Table
@@ -16,7 +17,7 @@ from dissectors import registry
 from dissectors.findings import counted
 from dissectors.frame import LineError
 from dissectors.line import NS_PER_S
-from dissectors.words import milliseconds
+from dissectors.words import milliseconds, percent
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.feed import FeedStatus
 from sniff.bus.rows import Store
@@ -121,8 +122,8 @@ def also(store: Store, status: FeedStatus) -> str:
 def errors(store: Store, status: FeedStatus) -> list[Part]:
     """Counts, each said to be unknown where the adapter cannot report it."""
     total = store.load.total
-    share = f" ({total.damaged / total.frames:.2%})" if total.frames else ""
-    noise = f" ({total.noise / total.octets:.2%})" if total.octets else ""
+    share = f" ({percent(total.damaged / total.frames, 2)})" if total.frames else ""
+    noise = f" ({percent(total.noise / total.octets, 2)})" if total.octets else ""
     words = [_count(store, name, flag) for name, flag in REPORTABLE]
     both = sum(number for error, number in store.marks.items() if EITHER in error)
     if both:
@@ -165,13 +166,15 @@ def curves(store: Store, most: int) -> tuple[Curve, Curve]:
         return [], []
     first, last = min(seconds), max(seconds)
     step = -(-(last - first + 1) // most)
+    busy, failed = Counter[int](), Counter[int]()  # of those that are there: a clock that jumps leaves out years
+    for at, second in seconds.items():
+        busy[(at - first) // step] += second.busy
+    for at, count in store.failed.items():
+        failed[(at - first) // step] += count
     shares, errors = [], []
-    for begin in range(first, max(first + 1, last + 1 - step), step):
-        part = range(begin, begin + step)
-        busy = sum(seconds[at].busy for at in part if at in seconds)
-        failed = sum(store.failed[at] for at in part if at in store.failed)
-        shares.append((begin * NS_PER_S, min(100.0, 100 * busy / (step * NS_PER_S))))
-        errors.append((begin * NS_PER_S, failed / step))
+    for place, begin in enumerate(range(first, max(first + 1, last + 1 - step), step)):
+        shares.append((begin * NS_PER_S, min(100.0, 100 * busy[place] / (step * NS_PER_S))))
+        errors.append((begin * NS_PER_S, failed[place] / step))
     return shares, errors
 
 

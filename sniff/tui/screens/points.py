@@ -14,6 +14,7 @@ from textual.widgets import DataTable, Static
 from dissectors.findings import counted
 from dissectors.line import NS_PER_S
 from dissectors.profiles.decoding import Quality, Value, number, range_words
+from dissectors.words import brief
 from sniff.analysis.guessed_points import GuessedPoint, LatestGuesses, guess_of
 from sniff.analysis.points import Point
 from sniff.analysis.sanitizing import sanitized
@@ -329,11 +330,6 @@ class PointsScreen(TableScreen):
         self.draw()
 
 
-def _brief(value: float) -> str:
-    """Whole numbers with all their digits, others with five."""
-    return number(value) if value.is_integer() else f"{value:.5g}"
-
-
 def _seen(point: Point, guess: GuessedPoint | None, has_times: bool) -> list[str]:
     """How often, how it moved, who wrote it."""
     samples = counted(point.count, "sample")
@@ -347,7 +343,7 @@ def _seen(point: Point, guess: GuessedPoint | None, has_times: bool) -> list[str
     if low is not None and high is not None and low != high:
         words.append(f"seen {number(low)} … {number(high)}")
     if rate and has_times:
-        words.append(f"moves {rate:.3g} a second")
+        words.append(f"moves {brief(rate, 3)} a second")
     if point.written:
         words.append(f"written {point.written} times" if point.written > 1 else "written once")
     return words
@@ -382,8 +378,8 @@ def _cells(
         Text(str(point.count), justify="right"),
         Text(interval(point.interval if has_times else None), justify="right"),
         Text(jitter(point.jitter, point.interval) if has_times else "–", justify="right"),
-        Text(_brief(low) if low is not None and is_number else "–", justify="right"),
-        Text(_brief(high) if high is not None and is_number else "–", justify="right"),
+        Text(brief(low, 5) if low is not None and is_number else "–", justify="right"),
+        Text(brief(high, 5) if high is not None and is_number else "–", justify="right"),
         Text(trend([number for _, number in point.history])),
         Text(sanitized(entry.title if entry is not None else guess.words if guess is not None else "")),
     ]

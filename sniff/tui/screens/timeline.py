@@ -11,7 +11,7 @@ from textual.widgets import Static
 
 from dissectors.findings import counted
 from dissectors.line import NS_PER_S
-from dissectors.words import duration
+from dissectors.words import brief, duration
 from sniff.analysis.load import Second
 from sniff.bus.rows import Store
 from sniff.tui.analyzer import analyzer
@@ -353,4 +353,5 @@ class _Chart(Static, can_focus=True):
 
 
 def _answered(ms: float) -> str:
-    return f"{ms:.2g} ms" if ms >= LEAST_TOLD else f"under {LEAST_TOLD:g} ms"
+    told = float(f"{ms:.2g}")  # classes of times are right to no more
+    return f"{brief(told, 2)} ms" if ms >= LEAST_TOLD else f"under {LEAST_TOLD:g} ms"

@@ -5,8 +5,6 @@ from __future__ import annotations
 import pytest
 
 from dissectors import registry
-from dissectors.line import MS, NS_PER_S
-from dissectors.words import exact_duration
 from sniff.filter.compiling import field_of
 from sniff.filter.completion import shown_value
 from sniff.filter.literals import value_of
@@ -18,11 +16,3 @@ from sniff.filter.syntax import Word
 def test_a_duration_is_offered_with_all_its_digits(name: str, time: int) -> None:
     field = field_of(name, registry.get("modbus-rtu"))
     assert value_of(Word(shown_value(time, field), 0), field.type, name, {}) == (time,)
-
-
-def test_a_duration_in_words_is_exact() -> None:
-    assert exact_duration(86_400_123_456_789, MS) == "86400123.456789"
-    assert exact_duration(-1_500_000_000, NS_PER_S) == "-1.5"
-    assert exact_duration(1500.5, MS) == "0.0015005"
-    assert exact_duration(0, MS) == "0"
-    assert exact_duration(20 * MS, MS) == "20"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -9,8 +10,10 @@ from textual.widgets import DataTable
 
 from dissectors.frame import LineError, Mark
 from dissectors.tracker import Verdict
+from sniff.analysis.load import Second
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.tui.screens.line import curves
+from sniff.tui.screens.timeline import _answered
 
 MS = 1_000_000
 
@@ -261,6 +264,23 @@ def test_the_curves_of_the_line_hold_all_that_was_heard(make_bus: Any) -> None:
     )
     few, _ = curves(store, 3)
     assert 1 <= len(few) <= 3
+
+
+def test_curves_of_a_clock_that_jumped_take_no_longer() -> None:
+    """From 1970 to now there are 1.8 thousand million seconds, two of which were heard."""
+    heard = {0: Second(busy=10**9), 1_772_359_200: Second(busy=10**9)}
+    load = SimpleNamespace(seconds=heard)
+    store: Any = SimpleNamespace(load=load, failed={0: 3}, session=SimpleNamespace(has_times=True))
+    shares, errors = curves(store, 240)
+    assert len(shares) == len(errors) == 239
+    assert sum(value > 0 for _, value in shares) == 1 == sum(value > 0 for _, value in errors)
+
+
+@pytest.mark.parametrize(
+    ("ms", "said"), [(0.001, "under 0.01 ms"), (0.123, "0.12 ms"), (12.3, "12 ms"), (1234.5, "1200 ms")]
+)
+def test_times_to_the_answers_are_no_powers_of_ten(ms: float, said: str) -> None:
+    assert _answered(ms) == said
 
 
 def test_a_short_file_has_the_health_that_every_command_tells(look: Any, make_bus: Any) -> None:
