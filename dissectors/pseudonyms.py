@@ -23,18 +23,30 @@ class Pseudonyms:
 
     def __init__(self, *classes: range, kept: Iterable[int]) -> None:
         self._known = {number: number for number in kept}
-        self._classes = [(numbers, filterfalse(frozenset(self._known).__contains__, numbers)) for numbers in classes]
+        self._used = set(self._known)
+        self._classes = [(numbers, iter(numbers), reversed(numbers)) for numbers in classes]
 
     def of(self, number: int) -> int:
         """The pseudonym of a number; itself when all are used up."""
-        if number not in self._known:
-            free = next((names for numbers, names in self._classes if number in numbers), iter(()))
-            self._known[number] = next(free, number)
-        return self._known[number]
+        return self._named(number, is_sure=True)
+
+    def of_doubtful(self, number: int) -> int:
+        """The pseudonym of a number out of a damaged frame. It may be nobody's, or somebody's who is heard of later: it
+        gets one from the end, so that the first ones are left for those that are sure."""
+        return self._named(number, is_sure=False)
 
     def if_known(self, number: int) -> int:
         """The pseudonym of a number that has one; else itself: a number out of a damaged frame may be nobody's."""
         return self._known.get(number, number)
+
+    def _named(self, number: int, *, is_sure: bool) -> int:
+        if number not in self._known:
+            both = next((ends for numbers, *ends in self._classes if number in numbers), None)
+            free = iter(()) if both is None else both[0] if is_sure else both[1]
+            name = next(filterfalse(self._used.__contains__, free), number)
+            self._known[number] = name
+            self._used.add(name)
+        return self._known[number]
 
 
 class Renamer(Protocol):

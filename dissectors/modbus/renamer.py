@@ -37,7 +37,7 @@ class RtuRenamer:
 
     def damaged_pdu(self, body: bytes) -> bytes:
         """The same where the unit may be nobody's, and anything may be missing."""
-        return bytes(map(self.stations.if_known, body[:1])) + self._without_text(body[1:])
+        return bytes(map(self.stations.of_doubtful, body[:1])) + self._without_text(body[1:])
 
     def _without_text(self, pdu: bytes) -> bytes:
         renamed = bytearray(pdu)

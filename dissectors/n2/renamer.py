@@ -18,7 +18,7 @@ class N2Renamer:
     def __call__(self, frame: Frame) -> bytes:
         """The frame under another name."""
         if frame.repair is None:
-            return self._renamed(frame.octets)
+            return self._renamed(frame.octets, is_sure=frame.ok)
         whole = frame.repair.octets
         renamed = self._renamed(whole)
         if frame.repair.flaw is not Flaw.CHECK_SWAPPED or whole[:1] != b">":
@@ -26,12 +26,12 @@ class N2Renamer:
         swapped = renamed[:-3] + renamed[-2:-1] + renamed[-3:-2] + renamed[-1:]
         return swapped if swapped != renamed else self._renamed(frame.octets)  # of two digits alike nothing shows
 
-    def _renamed(self, octets: bytes) -> bytes:
+    def _renamed(self, octets: bytes, *, is_sure: bool = True) -> bytes:
         """The octets of a command with another address; its sum is right as before, or wrong by as much."""
         address = hex_octet(octets[1:3])
         if octets[:1] != b">" or address is None:
             return octets
-        name = b"%02X" % self.stations.of(address)
+        name = b"%02X" % (self.stations.of(address) if is_sure else self.stations.of_doubtful(address))
         sent = hex_octet(octets[-3:-1])
         if len(octets) < _SHORTEST or octets[-1:] != b"\r" or sent is None:
             return octets[:1] + name + octets[3:]

@@ -92,7 +92,7 @@ def test_a_damaged_modbus_answer_loses_its_texts_and_keeps_its_error() -> None:
     answer = bytes([3, 17, len(NAME) + 1]) + NAME + b"\xff"
     check = (crc16_modbus(answer) ^ 0x0140).to_bytes(2, "little")
     renamed = RtuRenamer()(_frame(answer + check, Check.BAD, Damage.CHECK))
-    assert renamed[:3] == answer[:3]
+    assert renamed[1:3] == answer[1:3]
     assert NAME[:4] not in renamed
     assert int.from_bytes(renamed[-2:], "little") ^ crc16_modbus(renamed[:-2]) == 0x0140
     assert NAME[:4] not in RtuRenamer()(_frame(answer[:20], Check.BAD, Damage.SHORT))
@@ -104,14 +104,14 @@ def test_a_damaged_modbus_answer_loses_its_texts_and_keeps_its_error() -> None:
     assert lrc(body[:-1]) + (lrc(answer) ^ 1) - lrc(answer) & 0xFF == body[-1]
     spoilt = line[:5] + b"?" + line[6:40]
     renamed = AsciiRenamer()(_frame(spoilt, Check.BAD, Damage.FORM))
-    assert (len(renamed), renamed[:7]) == (len(spoilt), spoilt[:7])
+    assert (len(renamed), renamed[3:7]) == (len(spoilt), spoilt[3:7])
     assert NAME[4:8].hex().upper().encode() not in renamed
 
 
 def test_a_damaged_frame_of_tcp_loses_its_texts() -> None:
     octets = bytes([0, 1, 0, 0, 0, 60, 3, 43, 14, 1, 1, 0, 0, 1, 0, len(NAME)]) + NAME[:20]
     renamed = TcpRenamer()(_frame(octets, Check.ABSENT, Damage.SHORT))
-    assert renamed == octets[:16] + b"x" * 20
+    assert renamed == octets[:6] + renamed[6:7] + octets[7:16] + b"x" * 20
 
 
 def _even(characters: bytes) -> bytes:
@@ -155,6 +155,20 @@ def test_a_damaged_n2_command_has_no_address_of_its_own_and_the_same_error() -> 
     alike = make_command("05110A04")  # 9C; with another address 99
     frame = replace(_frame(alike[:-3] + b"C9\r", Check.BAD, Damage.CHECK), repair=Repair(Flaw.CHECK_SWAPPED, alike))
     assert judge(rename(frame))[1] is Damage.CHECK
+
+
+def test_a_damaged_frame_before_the_first_good_one_names_nobody() -> None:
+    body = bytes.fromhex("110300000002")
+    rtu = body + crc16_modbus(body).to_bytes(2, "little")
+    line, command = make_ascii(17, body[1:]), make_command("11110A03")
+    for rename, good, spoilt, place in (
+        (RtuRenamer(), rtu, rtu[:-1] + bytes([rtu[-1] ^ 1]), slice(0, 1)),
+        (AsciiRenamer(), line, line[:-4] + b"00\r\n", slice(1, 3)),
+        (N2Renamer(), command, command[:-3] + b"00\r", slice(1, 3)),
+    ):
+        first = rename(_frame(spoilt, Check.BAD, Damage.CHECK))[place]
+        assert first != good[place]
+        assert rename(_frame(good, Check.GOOD, None))[place] == first
 
 
 def test_a_count_that_could_be_a_letter_stays_a_count() -> None:
