@@ -1,4 +1,4 @@
-"""What is too rare to be worth a warning: the borders of both measures."""
+"""How likely so much is by chance, and what is too rare to be worth a warning: the borders of both measures."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ LONG = 1_000_000
         (1, 1, 1, True),  # one is nothing, whatever it is one of
         (2, 200, MINUTE, False),  # one in a hundred
         (2, 201, MINUTE, True),
+        (3, 918, 53 * MINUTE // 60, True),  # three in the only minute do not say two a minute
         (4, LONG, MINUTE, True),
         (5, LONG, MINUTE, False),
         (4, LONG, 1, True),  # less than a minute is one
@@ -28,6 +29,15 @@ LONG = 1_000_000
 )
 def test_what_is_rare(count: int, of: int, span: int, is_so: bool) -> None:
     assert is_rare(count, of, span) is is_so
+
+
+def test_the_chance_of_so_many() -> None:
+    assert at_least(0, 10, 0.3) == at_least(0, 10, 0.5) == at_least(5, 5, 1.0) == 1
+    assert at_least(10, 10, 0.5) == pytest.approx(2**-10)
+    assert at_least(3, 3, 0.5) == pytest.approx(0.125)
+    assert at_least(1, 2, 0.5) == pytest.approx(0.75)
+    assert at_least(300, 500, 0.5) < 1e-5
+    assert at_least(500, 1000, 0.5) == pytest.approx(0.51, abs=0.02)
 
 
 @pytest.mark.parametrize("share", [0.01, 0.1, 0.5, 0.9])

@@ -7,7 +7,6 @@ from functools import partial
 
 import pytest
 
-from dissectors.chances import at_least
 from dissectors.findings import Severity
 from dissectors.frame import Flaw
 from dissectors.modbus.garbage import Garbage, slower_by, text_of, whole_runs
@@ -259,14 +258,6 @@ def test_who_has_more_than_its_share_is_blamed(bus):
         else:
             bus.exchange(READ, VALUES)
     assert {code for code, _ in graves_of(bus)} == {"MB005"}
-
-
-def test_chance_is_the_tail_of_a_binomial():
-    assert at_least(0, 10, 0.3) == 1
-    assert at_least(3, 3, 0.5) == pytest.approx(0.125)
-    assert at_least(1, 2, 0.5) == pytest.approx(0.75)
-    assert at_least(300, 500, 0.5) < 1e-5
-    assert at_least(5, 5, 1.0) == 1
 
 
 def test_a_search_for_stations_is_one_fact(bus):

@@ -7,7 +7,6 @@ from functools import partial
 
 import pytest
 
-from dissectors.chances import MINUTE, at_least, is_rare
 from dissectors.findings import Finding, Severity
 from dissectors.frame import Place
 from dissectors.simulated_faults import BitFlips, Break, MarkParity, NoiseInGaps
@@ -73,6 +72,11 @@ def test_who_sends_little_is_not_named_for_a_few() -> None:
 )
 def test_what_is_too_rare_to_say(count: int, of: int, span: int, rare: bool) -> None:
     assert is_rare(count, of, span) == rare
+
+
+def test_twice_as_much_as_the_others_is_not_clearly_more_however_often() -> None:
+    assert standing_out({"1": (400, 1.0), "2": (200, 1.0), "3": (200, 1.0)}) == set()
+    assert standing_out({"1": (500, 1.0), "2": (200, 1.0), "3": (200, 1.0)}) == {"1"}
 
 
 def graves(make: partial, tap: TapModel = EXACT, seconds: float = 30, seed: int = 1) -> set[tuple[str, str]]:  # type: ignore[type-arg]
