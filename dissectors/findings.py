@@ -212,7 +212,7 @@ class Tally:
         self.first = min(self.first, *times) if self.count else min(times)
         self.last = max(self.last, *times) if self.count else max(times)
         self.count += len(times)
-        for no in islice(frames, EVIDENCE_MAX - len(self.evidence)):
+        for no in islice(frames, max(0, EVIDENCE_MAX - len(self.evidence))):
             self.evidence.append(no)
 
     def found(self, rule: Rule, subject: str | Subject, seen: str, severity: Severity | None = None) -> Finding:

@@ -109,6 +109,7 @@ class LateSpeakers:
         lasts = LASTS * (PATIENCE if patience is None else min(patience, PATIENCE))
         self._window(station).opened += 1
         self._newest = station
+        self._open.pop(station, None)  # the one that was not waited for the longest is the first to go
         self._open[station] = _Open(end + lasts, lasts, due)
         if len(self._open) > _OPEN_KEPT:
             del self._open[next(iter(self._open))]

@@ -148,3 +148,11 @@ def test_many_are_counted_as_one_by_one_whatever_their_times() -> None:
         assert at_once == one_by_one == together(apart)
     assert (at_once.count, at_once.first, at_once.last) == (27, 3, 200)
     assert at_once.evidence == list(range(EVIDENCE_MAX))
+
+
+def test_where_all_frames_have_their_place_taken_more_are_only_counted() -> None:
+    tally = Tally()
+    tally.add(5, *range(EVIDENCE_MAX + 1))
+    tally.add_many([6, 7], [98, 99])
+    assert (tally.count, tally.last) == (3, 7)
+    assert not {98, 99} & set(tally.evidence)

@@ -72,3 +72,11 @@ def test_requests_damaged_directly_behind_one_stations_silence(damaged: int, els
         elif turn < elsewhere * 10 and turn % 10 == 5:
             late.damaged_request(b"", now, turn)
     assert is_behind(late.windows[9].behind.count, late.damaged[MASTER], damaged, 200 + 2 * damaged) is is_told
+
+
+def test_of_many_waits_the_newest_go_on() -> None:
+    late = LateSpeakers()
+    for at, station in enumerate((1, 2, 3, 4, 5, 6, 7, 8, 1, 9)):
+        late.unanswered(station, Due(bytes([station]), bytes([station, 3])), at, at, None)
+    shown = [station for station in range(1, 10) if late.shows(bytes([station, 3, 2]), 10)]
+    assert shown == [1, 3, 4, 5, 6, 7, 8, 9]
