@@ -50,6 +50,8 @@ class Seat:
     told_dropped: bool = False
     told_trouble: str = ""
     health: HealthMeter = field(default_factory=HealthMeter)
+    _events_seen: int = 0  # of the line
+    _of_port: LineEventKind | None = None  # the newest of those
 
     @classmethod
     def of(cls, feed: Feed, start_screen: str) -> Seat:
@@ -76,12 +78,20 @@ class Seat:
         """How the bus is."""
         if self.status.live and self.status.ended:
             return BusState.ENDED
-        port = next((one for one in reversed(self.feed.store.line_events) if one.kind in _OF_PORT), None)
-        if self.status.live and port is not None and port.kind is LineEventKind.UNPLUGGED:
+        if self.status.live and self._port() is LineEventKind.UNPLUGGED:
             return BusState.DOWN
         if self.status.trouble:
             return BusState.FAILS
         return BusState.SEARCHING if self.status.searching else BusState.WELL
+
+    def _port(self) -> LineEventKind | None:
+        """What befell its port last. A bus may have an event a second: each is looked at once."""
+        events = self.feed.store.line_events
+        for event in events[self._events_seen :]:
+            if event.kind in _OF_PORT:
+                self._of_port = event.kind
+        self._events_seen = len(events)
+        return self._of_port
 
     def line(self, is_here: bool) -> BusLine:
         """What the bar says of it now."""

@@ -20,7 +20,7 @@ from sniff.engine.observer import observe
 from sniff.engine.session import LineEvent, LineEventKind, gone
 from sniff.tui.app import SnifferApp
 from sniff.tui.busbar import labels
-from sniff.tui.seats import BusLine, BusState
+from sniff.tui.seats import BusLine, BusState, Seat
 from tests.sniff.analysis.sites_made import Exchange, asked, heard, power_lost, sessions
 from tests.sniff.tui.conftest import Looking
 
@@ -198,3 +198,27 @@ def test_trouble_is_said_in_words_and_nothing_hostile_is_drawn() -> None:
     assert "\x1b" not in said(lines, 120)
     assert said(buses(30, state=BusState.DOWN), 80).endswith("…!")
     assert said(buses(2, health=None), 80).count("–") == 2
+
+
+def test_each_event_of_a_line_is_looked_at_once() -> None:
+    """A bus with errors has one a second; the bar is drawn ten times a second."""
+
+    class Watched(list[LineEvent]):
+        looked = 0
+
+        def __getitem__(self, which: Any) -> Any:
+            found = super().__getitem__(which)
+            Watched.looked += len(found)
+            return found
+
+        __reversed__ = None
+
+    kept = store("boiler", 4)
+    kept.line_events = Watched(LineEvent(number, LineEventKind.ERRORS, "parity", 1) for number in range(1000))
+    seat = Seat.of(StoreFeed(kept, FeedStatus("/dev/x", "19200,8E1", "modbus-rtu", "site.mcap", live=True)), "frames")
+    assert [seat.state for _ in range(100)] == [BusState.WELL] * 100
+    kept.add_line_event(LineEvent(2000, LineEventKind.UNPLUGGED, gone("/dev/x", "hung up")))
+    assert seat.state is BusState.DOWN
+    kept.add_line_event(LineEvent(2001, LineEventKind.REPLUGGED, "/dev/x is back"))
+    assert seat.state is BusState.WELL
+    assert Watched.looked == 1002
