@@ -75,6 +75,12 @@ class Part:
         """Of its transactions."""
         return self.column(f"closed.{name}")
 
+    @property
+    def closed_names(self) -> tuple[str, ...]:
+        """Texts of its transactions."""
+        whole = self.whole
+        return whole.closed_names if isinstance(whole, PackedTable) else whole.transactions.names
+
     def ranks(self) -> tuple[Values, int]:
         """As `PackedTable.ranks`."""
         whole = self.whole

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 from dissectors.columns import NONE, VERDICTS, Times, TransactionColumns
 from dissectors.tracker import Passing, Transaction, Verdict
+from sniff.bus.kept_tables import KeptTables
 
 BAD_VERDICTS = frozenset(
     {
@@ -21,8 +25,11 @@ BAD_VERDICTS = frozenset(
     }
 )
 _BAD = np.array([verdict in BAD_VERDICTS for verdict in VERDICTS], bool)
+_NO_RESPONSE = VERDICTS.index(Verdict.NO_RESPONSE)
 _LOOKING = (Passing.POLL, Passing.STATUS)
 _NONE: Times = np.zeros(0, np.int64)
+
+_Places = npt.NDArray[np.integer[Any]]
 
 
 def is_trouble(transaction: Transaction) -> bool:
@@ -33,15 +40,34 @@ def is_trouble(transaction: Transaction) -> bool:
 
 def rows_in_trouble(closed: TransactionColumns) -> tuple[Times, Times]:
     """Of transactions that went wrong, the number of a row, and when they began, ns."""
-    bad = _BAD[closed.verdict] & ~_looked_in_vain(closed)
+    bad = _in_trouble(closed.verdict, closed.kind, closed.names)
     if not bad.any():
         return _NONE, _NONE
     numbers = np.where(closed.request[bad] != NONE, closed.request[bad], closed.response[bad])
     return numbers[numbers != NONE], closed.start[bad][numbers != NONE]
 
 
-def _looked_in_vain(closed: TransactionColumns) -> npt.NDArray[np.bool_]:
-    """Which looked for a station to pass the token to where there is none: masters do that all day."""
-    kinds = [at for at, name in enumerate(closed.names) if name in _LOOKING]
-    nobody: npt.NDArray[np.bool_] = closed.verdict == VERDICTS.index(Verdict.NO_RESPONSE)
-    return nobody & np.isin(closed.kind, kinds) if kinds else np.zeros(len(closed), bool)
+def closings_in_trouble(kept: KeptTables, no: int, step: int) -> Iterator[int]:
+    """Numbers of the closings that went wrong: those after `no`, or with -1 those before it; the nearest first."""
+    at = max(no + 1, kept.first_closed) if step > 0 else min(no - 1, kept.last_closed)
+    while (part := kept.part_of_closing(at)) is not None:
+        bad = _in_trouble(part.closed_column("verdict"), part.closed_column("kind"), part.closed_names)
+        numbers = np.flatnonzero(bad) + part.closed_first
+        if step > 0:
+            yield from numbers[numbers >= at].tolist()
+            at = part.closed_first + part.closed
+        else:
+            yield from numbers[(numbers <= at) & (numbers >= kept.first_closed)][::-1].tolist()
+            at = part.closed_first - 1
+
+
+def _in_trouble(verdict: _Places, kind: _Places, names: Sequence[str]) -> npt.NDArray[np.bool_]:
+    """Which transactions with these verdicts and kinds went wrong.
+
+    Masters look all day for a station to pass the token to where there is none.
+    """
+    bad: npt.NDArray[np.bool_] = _BAD[verdict]
+    kinds = [at for at, name in enumerate(names) if name in _LOOKING]
+    if kinds:
+        bad &= (verdict != _NO_RESPONSE) | ~np.isin(kind, kinds)
+    return bad

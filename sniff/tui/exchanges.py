@@ -52,8 +52,7 @@ class Exchanges:
     def _take(self, part: Any, which: slice) -> None:
         station = part.closed_column("station")[which]
         kind = part.closed_column("kind")[which]
-        names = part.whole.closed_names if hasattr(part.whole, "closed_names") else part.whole.transactions.names
-        passing = np.array([name in PASSING for name in names] or [False], bool)
+        passing = np.array([name in PASSING for name in part.closed_names] or [False], bool)
         verdict = part.closed_column("verdict")[which]
         wanted = (station != NONE) & ~passing[kind] & (verdict != _TO_ALL)
         verdict = verdict[wanted]

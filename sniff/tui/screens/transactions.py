@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from textual.app import ComposeResult
 
-from sniff.bus.trouble import is_trouble
+from sniff.bus.trouble import closings_in_trouble
 from sniff.tui.analyzer import analyzer
 from sniff.tui.filter_line import FilterLine
 from sniff.tui.index import Known
 from sniff.tui.linelist import LineList
 from sniff.tui.screens.listing import ListingScreen
 from sniff.tui.transaction_list import TransactionList
-
-FARTHEST = 200_000
-"""How many good transactions `e` walks over at most."""
 
 
 class TransactionsScreen(ListingScreen):
@@ -62,13 +59,8 @@ class TransactionsScreen(ListingScreen):
     def action_error(self, direction: int) -> None:
         """Next or previous transaction that went wrong and that is shown."""
         lines = self.lines
-        line = lines.index.position(lines.cursor) + direction
-        for _ in range(FARTHEST):
-            if not 0 <= line < len(lines.index):
-                break
-            transaction = self.store.closed_by_no(lines.index[line])
-            if transaction is not None and is_trouble(transaction):
-                lines.go_to(lines.index[line])
+        for number in closings_in_trouble(self.store.kept, lines.cursor, direction):
+            if number in lines.index:
+                lines.go_to(number)
                 return
-            line += direction
         self.notify("no trouble after this one" if direction > 0 else "no trouble before this one", timeout=2)

@@ -22,7 +22,7 @@ from sniff.bus.offline import outputs
 from sniff.bus.prepared import prepare
 from sniff.bus.row_masks import ACCEPTED, DOUBTFUL, RowMasks
 from sniff.bus.rows import Store
-from sniff.bus.trouble import BAD_VERDICTS
+from sniff.bus.trouble import BAD_VERDICTS, closings_in_trouble, is_trouble
 from sniff.engine.blocks import Block, in_pieces
 from sniff.engine.bulk import tables
 from sniff.engine.engine import Output, Row
@@ -140,6 +140,17 @@ def test_errors_gaps_and_times_are_those_of_the_reference(name: str, cuts: list[
         first = next(one.no for one in rows if one.event.start >= row.event.start)
         assert store.row_at(row.event.start) == first
     assert store.row_at(rows[-1].event.start + 1) == len(rows) + 1
+
+
+@pytest.mark.parametrize("name", NAMES)
+@BUSES
+@given(CUTS, st.integers(1, 200), st.integers(50, 1000), st.integers(0, 400))
+def test_closings_in_trouble_are_found_both_ways(name: str, cuts: list[int], pack: int, keep: int, no: int) -> None:
+    store = filled(name, cuts, pack, keep)
+    kept = range(store.dropped_transactions + 1, store.last_closed + 1)
+    bad = [one for one in kept if (held := store.closed_by_no(one)) is not None and is_trouble(held)]
+    assert list(closings_in_trouble(store.kept, no, 1)) == [one for one in bad if one > no]
+    assert list(closings_in_trouble(store.kept, no, -1)) == [one for one in reversed(bad) if one < no]
 
 
 @pytest.mark.parametrize("name", NAMES)
