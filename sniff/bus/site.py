@@ -11,8 +11,10 @@ if TYPE_CHECKING:
     from sniff.analysis.site_findings import SiteBus
     from sniff.bus.model import BusModel
 
-_BUS_OF = re.compile(r"(.*?\.\w+|.+) \[[^/\\]*\](?: and \d+ more parts?)?", re.DOTALL)
-"""A file, a bus in it, and how many more files it is in."""
+_OF_FILE = re.compile(r"(.*?\.\w+) \[[^/\\]*\]", re.DOTALL)
+"""A file with a suffix, and a bus in it."""
+
+_MORE_PARTS = re.compile(r" and \d+ more parts?$")
 
 
 def site_bus(model: BusModel, ear: SiteEar, findings: tuple[Finding, ...] | None = None) -> SiteBus:
@@ -34,5 +36,8 @@ def site_bus(model: BusModel, ear: SiteEar, findings: tuple[Finding, ...] | None
 def site_name(source: str) -> str:
     """The recording that a bus is one of, by how its captures are called: "site.mcap [boiler]". Folders and files may
     have brackets in their names, too."""
-    match = _BUS_OF.fullmatch(source)
-    return source if match is None else match[1]
+    first = _MORE_PARTS.sub("", source)
+    if not first.endswith("]"):
+        return source
+    of_file = _OF_FILE.fullmatch(first)
+    return first.split(" [", 1)[0] if of_file is None else of_file[1]

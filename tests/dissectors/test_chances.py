@@ -51,3 +51,11 @@ def test_the_tail_goes_on_where_it_is_no_longer_summed(share: float) -> None:
 
 def test_more_than_there_are_do_not_come() -> None:
     assert at_least(1, -2, 0.2) == at_least(3, 2, 0.5) == at_least(500, 450, 0.5) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("count", "of", "share", "chance"),
+    [(4, 400, 0.00125, 1.75e-3), (4, 1000, 0.0005, 1.75e-3), (9, 1000, 0.002, 2.32e-4), (40, 10**7, 1e-6, 1.2e-12)],
+)
+def test_few_of_very_many_are_no_more_surprising(count: int, of: int, share: float, chance: float) -> None:
+    assert at_least(count, of, share) == pytest.approx(chance, rel=0.1)

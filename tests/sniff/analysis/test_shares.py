@@ -38,40 +38,10 @@ def test_who_is_struck_more_than_his_share_is_named() -> None:
     assert standing_out({}) == standing_out({"1": (5, 1.0)}) == set()
 
 
-def test_the_chance_of_so_many() -> None:
-    assert at_least(0, 10, 0.5) == 1
-    assert at_least(10, 10, 0.5) == pytest.approx(2**-10)
-    assert at_least(500, 1000, 0.5) == pytest.approx(0.51, abs=0.02)
-
-
-@pytest.mark.parametrize(
-    ("count", "of", "share", "chance"),
-    [(4, 400, 0.00125, 1.75e-3), (4, 1000, 0.0005, 1.75e-3), (9, 1000, 0.002, 2.32e-4), (40, 10**7, 1e-6, 1.2e-12)],
-)
-def test_few_of_very_many_are_no_more_surprising(count: int, of: int, share: float, chance: float) -> None:
-    assert at_least(count, of, share) == pytest.approx(chance, rel=0.1)
-
-
 def test_who_sends_little_is_not_named_for_a_few() -> None:
     others = {f"station {number}": (50, 100_000.0) for number in range(1, 20)}
     assert standing_out({**others, "station 20": (4, 1_000.0)}) == set()
     assert standing_out({**others, "station 20": (9, 1_000.0)}) == {"station 20"}
-
-
-@pytest.mark.parametrize(
-    ("count", "of", "span", "rare"),
-    [
-        (1, 1, 0, True),
-        (2, 100, MINUTE, False),  # over 1 in 100
-        (3, 918, 53 * MINUTE // 60, True),  # three in the only minute do not say two a minute
-        (4, 900, MINUTE, True),
-        (5, 900, MINUTE, False),
-        (28, 9000, 10 * MINUTE, True),
-        (29, 9000, 10 * MINUTE, False),
-    ],
-)
-def test_what_is_too_rare_to_say(count: int, of: int, span: int, rare: bool) -> None:
-    assert is_rare(count, of, span) == rare
 
 
 def test_twice_as_much_as_the_others_is_not_clearly_more_however_often() -> None:
