@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 MOST_AT_ONCE = 100_000
 """Seconds that a table may span to be counted in one go."""
 
+ON_ITS_WAY = NS_PER_S
+"""ns that what was heard may take until it is counted."""
+
 KEPT_SECONDS = 86_400
 """Seconds that are known one by one; a day of them takes some 20 MB."""
 
@@ -145,14 +148,16 @@ class Load:
                 second = self.seconds.setdefault(number, second)
         return second
 
-    def share(self, over: int = 10) -> float:
-        """Bus load, 0 … 1, over the last `over` seconds up to the newest event."""
+    def share(self, over: int = 10, now: int | None = None) -> float:
+        """Bus load, 0 … 1, over the last `over` seconds up to the newest event. `now`: of a bus that is listened to,
+        ns: up to then, where it has been silent for longer than what was heard may be on its way."""
         if self.last is None or self.first is None:
             return 0.0
-        newest = self.last // NS_PER_S
+        end = self.last if now is None or now - self.last <= ON_ITS_WAY else now
+        newest = end // NS_PER_S
         numbers = range(max(newest - over + 1, self.first // NS_PER_S), newest + 1)
         busy = sum(self.seconds[number].busy for number in numbers if number in self.seconds)
-        span = max(self.last - max(self.first, numbers.start * NS_PER_S), self.line.char)
+        span = max(end - max(self.first, numbers.start * NS_PER_S), self.line.char)
         return min(1.0, busy / span)
 
     def share_of(self, part: Second, start: int, end: int) -> float:

@@ -25,7 +25,7 @@ class FeedStatus:
     `follows`: the recording that rows are read from while another process writes it; "": they are from a port.
     `searching`: with which settings a search listens at the moment, empty when there is none.
     `second`: a second protocol on the bus, by its registry name, where the whole file was read; `foreign`: how many
-    frames of it, in rows from `since` on.
+    frames of it, in rows from `since` on. `now`: ns, up to when a live bus was listened to; None for others.
     """
 
     port: str
@@ -47,6 +47,7 @@ class FeedStatus:
     second: str = ""
     foreign: int = 0
     since: int = 0
+    now: int | None = None
 
     @property
     def in_file(self) -> bool:

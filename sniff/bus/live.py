@@ -86,7 +86,8 @@ class LiveBus:
     other buses of the capture, where there are any (`beside_others`). `search`: finds what `session.unknown` names,
     None when everything is given; its octets are recorded like all others. When it ends, `session`, `dissector` and
     the model's become others, before the event and the outputs that this gives are handed out. `unseen`: octets that
-    came here, or were on their way, and were never looked at.
+    came here, or were on their way, and were never looked at. `now`: ns, up to when all that was heard has come here,
+    None before anything was said of it.
     """
 
     def __init__(
@@ -116,7 +117,8 @@ class LiveBus:
         self.beside_others = False
         self._gathering = Gathering()  # reads that wait for the engine
         self._gathered_since = 0  # when the first of them came, ns
-        self._now: int | None = None  # up to when all that was heard has come here
+        self._now: int | None = None  # up to when all that was heard has come here, and silence was not told yet
+        self.now: int | None = None
         self._patience = 0 if watched else UNWATCHED
         self._late = 0  # octets looked at although their time is over
         self._skipped = 0
@@ -300,7 +302,7 @@ class LiveBus:
 
     def _pass_time(self, now: int) -> list[LiveTables]:
         """All that was heard up to `now` (ns) has come here."""
-        self._now = now
+        self._now = self.now = now
         if self._values is not None:
             self._values.pass_time(now)
         items: list[LiveTables] = []

@@ -101,6 +101,7 @@ class LiveFeed:
             priority=status.priority,
             searching="" if searching is None else f"{searching.line}",
             follows=self._follows,
+            now=self.live.now,
         )
 
     def mark(self, time: int, text: str | None) -> str:

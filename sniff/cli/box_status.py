@@ -47,7 +47,7 @@ def judged_status(status: BusStatus, live: LiveBus, found: Sequence[Finding], dr
         protocol=live.session.protocol_words,
         frames=summary.frames,
         damaged=summary.damaged,
-        load=summary.load.share(),
+        load=summary.load.share(now=live.now),
         health=live.model.health().bus.score if summary.frames else None,
         searching=live.searching is not None,
         findings=tuple(finding_line(one, drift) for one in findings[:MOST_FINDINGS]),

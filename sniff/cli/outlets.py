@@ -219,7 +219,7 @@ def _made(settings: OutletSettings, also: Sequence[Hearer]) -> Telling:
         from sniff.outlets.metrics import BusNow, exposition
 
         if server is not None:
-            now = [BusNow(one.model, one.status.lost, one.ended is None) for one in teller.lives.values()]
+            now = [BusNow(one.model, one.status.lost, one.ended is None, one.now) for one in teller.lives.values()]
             server.page = exposition(now, outlets)
 
     teller = Teller([*outlets, *also], None if server is None else publish)

@@ -162,5 +162,5 @@ def _headline(live: LiveBus) -> str:
     what = "searching for settings" if live.searching is not None else f"{session.line_words} {session.protocol_words}"
     return (
         f"{sanitized(session.port)} {what}: {summary.frames} frames ({summary.damaged} damaged), load "
-        f"{summary.load.share():.0%}; Ctrl-C ends"
+        f"{summary.load.share(now=live.now):.0%}; Ctrl-C ends"
     )

@@ -27,11 +27,13 @@ MOST_VALUES = 2000
 
 @dataclass(frozen=True, slots=True)
 class BusNow:
-    """A bus as it stands: its model, octets that were lost to the file, and whether it is still heard."""
+    """A bus as it stands: its model, octets that were lost to the file, whether it is still heard, and when that is,
+    ns."""
 
     model: BusModel
     lost: int = 0
     up: bool = True
+    now: int | None = None
 
 
 _FAMILIES = (
@@ -95,7 +97,7 @@ def _samples(told: BusNow) -> Iterator[tuple[str, str]]:
     yield total("sniff485_damaged_frames", summary.damaged)
     yield total("sniff485_noise_octets", summary.noise)
     yield total("sniff485_unrecorded_octets", told.lost)
-    yield one("sniff485_load_ratio", summary.load.share())
+    yield one("sniff485_load_ratio", summary.load.share(now=told.now))
     health = model.health()
     yield one("sniff485_health", health.bus.score)
     for station, each in sorted(health.stations.items()):

@@ -109,7 +109,7 @@ def status_line(
     pieces = [
         *([(f"searching {sanitized(status.searching)} …", "doubt")] if status.searching else []),
         *([] if status.searching else [(sanitized(status.line), ""), (protocols(status), "")]),
-        *([(f"load {store.load.share():.0%}", "")] if store.session.has_times else []),
+        *([(f"load {store.load.share(now=status.now):.0%}", "")] if store.session.has_times else []),
         *([] if health is None else [(f"health {health.score}", _health_style(health.score))]),
         (f"err {store.error_total}", "bad" if store.error_total else ""),
         (shown_state, STATE_STYLES.get(state, "")),

@@ -99,7 +99,7 @@ class Seat:
         if not self.is_still_read:
             self.health.look(store, final=not self.status.live)
         health = None if self.health.bus is None else self.health.bus.score
-        load = store.load.share() if self.status.live else store.load.overall()
+        load = store.load.share(now=self.status.now) if self.status.live else store.load.overall()
         return BusLine(self.name, self.state, health, load, store.error_total, self.status.dropped, is_here)
 
 

@@ -150,12 +150,12 @@ Curve = list[tuple[int, float]]
 """Times, ns, and values."""
 
 
-def load(store: Store) -> list[Part]:
+def load(store: Store, status: FeedStatus) -> list[Part]:
     """How busy the bus is."""
     known = store.load
     if not store.session.has_times:
         return []
-    return [("load", Text(f"{known.share():.0%} now, {known.overall():.0%} overall"))]
+    return [("load", Text(f"{known.share(now=status.now):.0%} now, {known.overall():.0%} overall"))]
 
 
 def curves(store: Store, most: int) -> tuple[Curve, Curve]:
@@ -235,7 +235,7 @@ class LineScreen(ViewScreen):
 
     def __init__(self) -> None:
         super().__init__()
-        self._drawn: tuple[int, int] | None = None
+        self._drawn: tuple[int, int, tuple[str, ...]] | None = None
 
     def compose_view(self) -> ComposeResult:
         """The sections."""
@@ -251,7 +251,8 @@ class LineScreen(ViewScreen):
         """Bring the page up to date, unless frozen."""
         page = self.query_one(Page)
         width = page.scrollable_content_region.width - LABEL - 4
-        state = (self.store.heard, width)
+        busy = load(self.store, analyzer(self).status)  # which goes down where nothing more is heard
+        state = (self.store.heard, width, tuple(words.plain for _, words in busy))
         if self._drawn == state or (self.viewing.frozen and self._drawn and self._drawn[1] == width) or width < 1:
             return
         self._drawn = state
@@ -259,7 +260,7 @@ class LineScreen(ViewScreen):
         sections = {
             "settings": settings(store, analyzer(self).status),
             "errors": errors(store, analyzer(self).status),
-            "load": load(store),
+            "load": busy,
             "gaps": gaps(store, width),
             "events": events(store.line_events, store.session.has_times),
         }

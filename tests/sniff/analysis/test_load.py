@@ -52,3 +52,16 @@ def test_no_ten_seconds_are_fuller_than_full(columns: bool) -> None:
             use.see(row.no, row.event, Role.REQUEST)
     (full,) = use.findings()
     assert full.seen == "octets on the line in 97% of 30 s at the busiest, 97% of all time"
+
+
+def test_a_bus_that_falls_silent_is_not_as_busy_as_it_was() -> None:
+    load = Load(SLOW)
+    for row in rows(6, 4 * S):
+        load.add(row)
+    assert load.last is not None
+    busy = load.share()
+    assert busy > 0.8
+    assert load.share(now=load.last + S // 2) == busy  # more may be on its way
+    assert load.share(now=load.last + 5 * S) < 0.6
+    assert load.share(now=load.last + 20 * S) == 0
+    assert load.share(now=load.last - 20 * S) == busy

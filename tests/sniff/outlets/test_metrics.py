@@ -68,6 +68,15 @@ def test_a_sum_of_days_still_grows_by_milliseconds() -> None:
     assert f'station="{node.address}"}} 123456.789012345\n' in exposition([one])
 
 
+def test_the_load_of_a_silent_bus_is_none() -> None:
+    one = told("rtu-usual-faults")
+    assert one.model.summary.load.last is not None
+    silent = replace(one, now=one.model.summary.load.last + 60 * 10**9)
+    assert 'sniff485_load_ratio{bus="boiler",protocol="modbus-rtu"} 0.0\n' in exposition([silent])
+    assert "sniff485_load_ratio" in exposition([one])
+    assert exposition([one]) != exposition([silent])
+
+
 PARSE = """
 import json, sys
 from prometheus_client.openmetrics.parser import text_string_to_metric_families as parse

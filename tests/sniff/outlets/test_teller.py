@@ -108,6 +108,7 @@ def test_that_nothing_is_heard_is_told_when_somebody_has_listened_for_a_while(no
             Tick(0, turn * 1000 * MS),
         ]
     live = told([outlet], messages, now)
+    assert live.now == 8000 * MS
     assert {one.news.finding.code for one in outlet.of(FindingTold)} - {"LN001"} == codes
     assert {one[1] for one in live.link.told} >= {"/bus/bus0"}  # type: ignore[attr-defined]
     assert {json.loads(one[5])["name"] for one in live.link.told if one[1] == "/findings"} - {"LN001"} == codes  # type: ignore[attr-defined]
