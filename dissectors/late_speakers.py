@@ -40,6 +40,7 @@ _SHOWN = 2  # of them such that show who spoke, and at least half of all
 _CUT = 3  # octets that a collision may swallow
 _ELSEWHERE, _SHARE = 5, 10  # frames of a sender elsewhere with which those in windows are compared; one in so many
 _SELDOM = 0.002
+_SELDOM_OF_ANY = 0.01  # the chance that so much damage stands in the windows of any that is waited for
 _OPEN_KEPT = 8  # windows that are open at once
 _KEPT = 256  # stations that are waited for, and senders in their windows
 
@@ -304,9 +305,11 @@ def _judge(
     chance = at_least(struck, struck + elsewhere, of / (of + of_elsewhere)) if struck else 1.0
     shown = window.shown.total()
     is_shown = shown >= _SHOWN and 2 * shown >= window.damage.count
-    is_sure = is_shown or (struck >= _LEAST and chance < _SELDOM)
+    is_sure = is_shown or (struck >= _LEAST and _is_seldom(chance, late))
     hit = (hit if is_sure else set()) | (
-        {sender for sender in only_here if window.struck[sender]} if is_shown else _standing_out(window, only_here)
+        {sender for sender in only_here if window.struck[sender]}
+        if is_shown
+        else _standing_out(window, only_here, late)
     )
     if sum(window.struck[sender] for sender in hit) < _LEAST:
         return None
@@ -320,7 +323,12 @@ def _frames(window: Window, sender: str) -> int:
     return window.struck[sender] + window.whole[MASTER if sender == NOBODY else sender]
 
 
-def _standing_out(window: Window, senders: set[str]) -> set[str]:
+def _is_seldom(chance: float, late: LateSpeakers) -> bool:
+    """Whether that is no chance, and not of any of those that are waited for either."""
+    return chance < _SELDOM and chance * len(late.windows) < _SELDOM_OF_ANY
+
+
+def _standing_out(window: Window, senders: set[str], late: LateSpeakers) -> set[str]:
     """Those of some senders that are struck in a window far more than all others, since noise strikes all alike; and
     often: who is late once is late as a rule."""
     hit = {sender for sender in senders if window.struck[sender] >= _LEAST}
@@ -335,4 +343,4 @@ def _standing_out(window: Window, senders: set[str]) -> set[str]:
         or 4 * (all_struck - struck) * here > struck * (all_here - here)
     ):
         return set()
-    return hit if at_least(struck, all_struck, here / all_here) < _SELDOM else set()
+    return hit if _is_seldom(at_least(struck, all_struck, here / all_here), late) else set()

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import random
+from collections import Counter
 
 import pytest
 
-from dissectors.late_speakers import MASTER, Due, Heard, LateSpeaker, LateSpeakers, is_behind, late_speakers
+from dissectors.findings import Tally
+from dissectors.late_speakers import MASTER, Due, Heard, LateSpeaker, LateSpeakers, Window, is_behind, late_speakers
 
 MS = 1_000_000
 WAIT = 200 * MS
@@ -80,3 +82,15 @@ def test_of_many_waits_the_newest_go_on() -> None:
         late.unanswered(station, Due(bytes([station]), bytes([station, 3])), at, at, None)
     shown = [station for station in range(1, 10) if late.shows(bytes([station, 3, 2]), 10)]
     assert shown == [1, 3, 4, 5, 6, 7, 8, 9]
+
+
+@pytest.mark.parametrize(("waited_for", "is_told"), [(1, True), (6, True), (7, False), (20, False)])
+def test_of_many_that_are_waited_for_one_has_the_most_damage_in_its_windows(waited_for: int, is_told: bool) -> None:
+    """6 of 115 answers then, 1 of 337 elsewhere: 15 in 10 000 by chance."""
+    late, name = LateSpeakers(), "station 1"
+    late.windows = {100 + at: Window() for at in range(1, waited_for)}
+    whole = Counter({name: 109, MASTER: 115})
+    late.windows[9] = Window(60, damage=Tally(6, 0, 9, [7]), struck=Counter({name: 6}), whole=whole)
+    late.damaged = Counter({name: 7})
+    told = list(late_speakers(late, {name: 445}, {9: Heard(5, 0, 60)}))
+    assert bool(told) is is_told
