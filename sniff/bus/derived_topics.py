@@ -138,7 +138,7 @@ class BusChannels:
             "frames": window.frames,
             "octets": window.octets,
             "errors": errors,
-            "error_rate": min(1.0, errors / window.frames) if window.frames else 0.0,
+            "error_rate": min(1.0, errors / max(1, window.frames)),  # an answer may be missed when nothing comes
             "health": bus_health(window).score,
             **_latency(window.latency),
         }
@@ -159,7 +159,7 @@ def _of_node(node: Node) -> dict[str, object]:
         "requests": node.asked,
         "responses": node.sent,
         "errors": errors,
-        "error_rate": min(1.0, errors / node.asked) if node.asked else 0.0,
+        "error_rate": min(1.0, errors / max(1, node.asked)),
         **({} if health is None else {"health": health.score}),
         **_latency(node.latency),
     }

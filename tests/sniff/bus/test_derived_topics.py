@@ -13,6 +13,7 @@ from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.bacnet.ring_observer import MstpRingObserver
 from dissectors.line import LineSettings
 from dissectors.simulated_faults import LostResponse
+from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.judging import Judging
 from sniff.bus.derived_topics import BUS, NODE, BusChannels
 from sniff.bus.model import BusModel
@@ -137,3 +138,14 @@ def test_that_nothing_is_heard_is_told_nobody_before_it_was_listened_for_a_while
     early = False
     assert [one for one in channels.findings(0) if b"LN002" in one.data]
     assert model.health().bus.score < 100
+
+
+def test_a_second_in_which_only_an_answer_was_missed_is_no_good_one() -> None:
+    session = Session("x", LineSettings(), "modbus-rtu")
+    channels = BusChannels(BusModel(session, registry.get("modbus-rtu")))
+    channels.due(S)
+    missed = Transaction(1, 3, "read", 1, None, Verdict.NO_RESPONSE, 0, S)
+    channels.add(Output((), (missed,)))
+    bus, node = (json.loads(one.data) for one in channels.due(2 * S))
+    assert (bus["frames"], bus["errors"], bus["error_rate"]) == (0, 1, 1.0)
+    assert (node["requests"], node["errors"], node["error_rate"]) == (1, 1, 1.0)
