@@ -288,6 +288,15 @@ class Detecting:
         self._refused.add(self.wanted)
         self._move()
 
+    def forgive(self) -> None:
+        """Say that another port stands there, or the same anew: what could not be set may be now."""
+        self._refused.clear()
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether the port could not do what is `wanted`: it can do nothing of all."""
+        return self.wanted in self._refused
+
     def outcome(self) -> Outcome:
         """What can be said when the search ends here."""
         reading = self.found or self.best

@@ -15,7 +15,7 @@ from dissectors.line import NS_PER_S, LineSettings
 from sniff.analysis.autodetect import Detecting, Outcome
 from sniff.capture.ipc import Ended, Message, ReceivedMessage, Tick
 from sniff.capture.link import CaptureLink
-from sniff.engine.session import LineEvent, refused_line, settings_change
+from sniff.engine.session import LineEvent, LineEventKind, refused_line, settings_change
 
 ANSWER_PATIENCE = 3 * NS_PER_S
 """How long a change of settings may take to be confirmed, ns, before it is asked for again."""
@@ -102,6 +102,8 @@ class Search:
             self._in_force = change.line or self._in_force
         elif isinstance(item, LineEvent):
             refused = refused_line(item)
+            if item.kind is LineEventKind.REPLUGGED:
+                self.detecting.forgive()
             if refused is not None and refused == self.detecting.wanted:
                 self.detecting.refuse()
         elif self._hears_what_is_wanted:  # anything else was heard with settings that nobody asks about
@@ -124,7 +126,8 @@ class Search:
         wanted = self.detecting.wanted
         if self._hears_what_is_wanted or self.detecting.found is not None:
             return
-        if wanted != self._asked or now - self._asked_at > ANSWER_PATIENCE:
+        is_new = wanted != self._asked and not self.detecting.is_refused  # who refuses all is asked now and then
+        if is_new or now - self._asked_at > ANSWER_PATIENCE:
             self._asked, self._asked_at = wanted, now
             self.link.reconfigure(self.bus, wanted)
 
