@@ -188,7 +188,7 @@ def ask(where: Path | int) -> BoxStatus:
         answer = connection.getresponse()
         value = json.loads(answer.read(MOST))
         return BoxStatus.from_json(value)
-    except (HTTPException, ValueError, KeyError, TypeError) as error:
+    except (HTTPException, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise OSError(f"no status page of a box: {type(error).__name__}") from error
     finally:
         connection.close()

@@ -57,6 +57,14 @@ def test_a_box_that_does_not_say_how_it_is_keeps_its_name(tmp_path: Path, monkey
         assert path.exists()
 
 
+@pytest.mark.parametrize("words", ["{}", "[]", '{"buses": ["x"]}', '{"buses": "x"}', "[" * 100_000])
+def test_what_is_no_status_page_is_said(tmp_path: Path, words: str) -> None:
+    with served(tmp_path / "site.sock") as page:
+        page.json = words
+        with pytest.raises(OSError, match="no status page of a box"):
+            ask(tmp_path / "site.sock")
+
+
 def said(path: Path, words: bytes) -> bytes:
     with closing(socket.socket(socket.AF_UNIX)) as reader:
         reader.settimeout(30)
