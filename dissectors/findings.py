@@ -45,7 +45,8 @@ class Rule:
     from which source. `means`, `next`: the defaults of its findings. `explains`: codes, or begins of codes, of what is
     most likely a mere consequence of what this rule finds, at warning or above. `told_by`: the same of what tells the
     same trouble better: where one of those stands, of the same subject, this rule's finding is a note under it; what
-    this rule finds of the bus stands under that of one station only where it is the only one that is struck.
+    this rule finds of the bus stands under that of one station only where it is the only one that is struck. `lasts`:
+    it is found as long as it is so, and no longer (`Finding.lasts`).
     """
 
     code: str
@@ -56,6 +57,7 @@ class Rule:
     next: str = ""
     explains: tuple[str, ...] = ()
     told_by: tuple[str, ...] = ()
+    lasts: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -374,4 +376,5 @@ def found(
         means=rule.means,
         next=rule.next,
         stated=subject if isinstance(subject, Subject) else None,
+        lasts=rule.lasts,
     )

@@ -72,6 +72,7 @@ _ALL = (
         "it is off, disconnected or has crashed",
         "the station's supply and wiring",
         explains=("MS102", "MS301"),
+        lasts=True,
     ),
     Rule(
         "MS107",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from dissectors import registry
-from dissectors.findings import Finding, Severity
+from dissectors.findings import Finding, Severity, found
 from dissectors.line import LineSettings
 from sniff.analysis.judging import Judging
 from sniff.engine.session import LineEvent, LineEventKind, Session
@@ -54,6 +54,14 @@ def test_what_lasts_is_not_over_for_that_nothing_new_is_heard_of_it() -> None:
     assert [(one.what, one.finding.code) for one in desk.look(judging.findings(), 3601 * S)] == [
         (NewsKind.GONE, "LN006")
     ]
+
+
+def test_who_left_the_ring_is_gone_until_it_is_back() -> None:
+    desk = NewsDesk(Severity.WARNING, 0)
+    left = found(registry.get("mstp").rules["MS106"], "MAC 9", "was passed over", first=0, last=10 * S, count=1)
+    assert [one.what for one in desk.look([left], 11 * S)] == [NewsKind.NEW]
+    assert desk.look([left], 10 * S + OVER_AFTER + 1) == []
+    assert [one.what for one in desk.look([], 700 * S)] == [NewsKind.GONE]
 
 
 def test_what_explains_what_goes_on_is_not_over() -> None:
