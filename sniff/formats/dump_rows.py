@@ -10,11 +10,14 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 _LEAST = 2
 _FITTING = 0.7
 _MOST = 32
 """Cells of a row."""
+SAME_ROWS = "*"
+"""A line that stands for rows that are all as the one above it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,24 +78,27 @@ _CHARACTERS = re.compile(r"^(?P<cells>.*?)  (?P<shown>\S.{0,15})$")
 
 def cells_of(texts: Sequence[str]) -> str:
     """The form of the cells of all rows of a log; "" where most lines are no rows, or rows of pairs."""
-    written = [text for text in texts if text.strip()]
+    lines = [text for text in texts if text.strip()]
+    written = [text for text in lines if text.strip() != SAME_ROWS]
     rows = [match for text in written if (match := _ROW.fullmatch(text)) is not None]
+    behind = [before.strip() == SAME_ROWS for before, text in pairwise(["", *lines]) if _ROW.fullmatch(text)]
     ends = sum(_LAST.fullmatch(text) is not None for text in written)
     if not rows or len(rows) + ends < _LEAST or 2 * (len(rows) + ends) < len(written):
         return ""
     for cell in CELLS:
         told = [octets for row in rows if (octets := _octets(row, cell)) is not None]
-        if len(told) == len(rows) and any(_go_on(rows, told, base) for base in (16, 8, 10)):
+        if len(told) == len(rows) and any(_go_on(rows, told, behind, base) for base in (16, 8, 10)):
             return cell.name
     return ""
 
 
-def _go_on(rows: Sequence[re.Match[str]], told: Sequence[bytes], base: int) -> bool:
-    """Whether offsets in a base follow from what the rows before hold, or begin anew."""
+def _go_on(rows: Sequence[re.Match[str]], told: Sequence[bytes], behind: Sequence[bool], base: int) -> bool:
+    """Whether offsets in a base follow from what the rows before hold, or begin anew. `behind`: whether rows that are
+    as the one before are left out above each."""
     expected = fitting = 0
-    for row, octets in zip(rows, told, strict=True):
+    for row, octets, is_behind in zip(rows, told, behind, strict=True):
         offset = int(row["offset"], base) if not set(row["offset"]) - set("0123456789abcdef"[:base]) else -1
-        fitting += offset in (0, expected)
+        fitting += offset in (0, expected) or (is_behind and offset > expected)
         expected = offset + len(octets)
     return fitting >= _FITTING * len(rows)
 

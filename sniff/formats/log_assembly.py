@@ -10,7 +10,7 @@ from dissectors.frame import Chunk
 from dissectors.line import MS, NS_PER_S, LineSettings
 from dissectors.words import duration
 from sniff.engine.session import Item, LineEvent, LineEventKind
-from sniff.formats.dump_rows import FILLED_UP
+from sniff.formats.dump_rows import FILLED_UP, SAME_ROWS
 from sniff.formats.log_clock import DAY, Stamp
 from sniff.formats.log_lines import Kind, Line, head_of
 from sniff.formats.log_packets import carried
@@ -32,6 +32,8 @@ summer ends; lines of several writers are nearer in order.
 
 _BACKWARDS = 2_000_000_000
 _MOST_REPEATED = 1 << 16
+_LARGEST = 1 << 32
+"""Octets that rows alike stand for; more is no file that somebody dumped."""
 
 
 class Assembly:
@@ -190,10 +192,14 @@ class Assembly:
         except ValueError:
             self.was = Kind.STRANGE
             return
-        if self._squeezed and self._expected < offset <= self._expected + _MOST_REPEATED and self._row:
+        if self._squeezed and self._expected < offset <= self._expected + _LARGEST and self._row:
             missing = offset - self._expected
-            self._held += (self._row * (missing // len(self._row) + 1))[:missing]
+            filled = min(missing, _MOST_REPEATED)
+            self._held += (self._row * (filled // len(self._row) + 1))[:filled]
             self._expected = offset
+            if filled < missing:
+                yield from self._flush()
+                yield LineEvent(self._last, LineEventKind.DROPPED, "too many rows alike", missing - filled)
         self._squeezed = False
         if not line.octets:  # the offset at the end
             most = len(self._row) if self._plan.margin.writing.cells in FILLED_UP else 2
@@ -222,7 +228,7 @@ class Assembly:
         return bool(self._held) and stamp is not None and first is not None and abs(stamp.time - first.time) < COARSE
 
     def _between_rows(self, line: Line, text: str) -> Iterator[Item]:
-        if text.strip() == "*":
+        if text.strip() == SAME_ROWS:
             self._squeezed = True
             self.was = Kind.SHAPE
             return

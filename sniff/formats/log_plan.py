@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from dissectors.line import MS
+from sniff.formats.dump_rows import SAME_ROWS
 from sniff.formats.log_lines import Kind, Line, head_of, line_of, numbers_of
 from sniff.formats.log_margin import NO_MARGIN, Margin, margin_of
 from sniff.formats.log_octets import PAIRS_ONLY
@@ -127,7 +128,9 @@ def _plan(texts: Sequence[str]) -> Plan | None:
     base = _base([numbers_of(text) for text in texts if text.strip()])
     times = order_of(texts)
     lines = [line_of(text, base, times=times) for text in texts]
-    offsets = _offsets([line for line in lines if line.kind is Kind.ROW])
+    offsets = _offsets(
+        [(line, before) for line, before in zip(lines, ["", *texts], strict=False) if line.kind is Kind.ROW]
+    )
     rows = sum(len(line.octets) for line in lines if line.kind is Kind.ROW)
     others = sum(len(line.octets) for line in lines if line.kind is Kind.OCTETS)
     if offsets is not None and rows >= others:
@@ -346,16 +349,18 @@ def _is_unpadded(tokens: Sequence[str]) -> bool:
     return any(len(token) != 2 for token in tokens) and not any(len(token) > 1 and token[0] == "0" for token in tokens)
 
 
-def _offsets(rows: Sequence[Line]) -> int | None:
-    """The base in which offsets of rows fit to what the rows hold; None when they do not."""
+def _offsets(rows: Sequence[tuple[Line, str]]) -> int | None:
+    """The base in which offsets of rows, each with the line before it, fit to what the rows hold; None when they do
+    not."""
     for base in (16, 8, 10):
         fitting = expected = 0
-        for row in rows:
+        for row, before in rows:
             try:
                 offset = int(row.offset, base)
             except ValueError:
                 continue
-            fitting += offset in (0, expected) or (not row.octets and offset <= expected)
+            is_behind_same = before.strip() == SAME_ROWS and offset > expected
+            fitting += offset in (0, expected) or (not row.octets and offset <= expected) or is_behind_same
             expected = offset + len(row.octets)
         if rows and fitting >= _ROWS_LEAST * len(rows):
             return base

@@ -14,7 +14,7 @@ MOST = 1 << 62
 UNITS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "µs": 1000, "μs": 1000, "ns": 1}
 _WITH_UNIT = re.compile(r"(?P<number>[+-]?\d{1,18}(?:[.,]\d{1,12})?) ?(?P<unit>s|ms|us|µs|μs|ns)")
 
-_NUMBER = re.compile(r"[+-]?\d{1,18}(?:[.,](?P<decimals>\d{1,18}))?(?:[eE][+-]?\d{1,3})?")
+_NUMBER = re.compile(r"[+-]?\d{1,18}(?:[.,](?P<decimals>\d{1,18}))?(?:[eE](?P<power>[+-]?\d{1,3}))?")
 
 MOST_CELL = 1 << 16
 LATEST = 1 << 33
@@ -135,8 +135,8 @@ def tick_of(text: str, unit: int, times: Times = AS_WRITTEN) -> int | None:
     number, unit = (text.strip(), unit) if counted is None else (counted["number"], UNITS[counted["unit"]])
     match = _NUMBER.fullmatch(number)
     if match is not None:
-        tick: int = unit // 10 ** len(match["decimals"] or "")
-        return max(1, tick)
+        place = len(match["decimals"] or "") - int(match["power"] or 0)
+        return max(1, unit // 10**place if place >= 0 else unit * 10 ** min(-place, DIGITS))
     stamp = stamp_of(text.strip(), times)
     return None if stamp is None or stamp.begin else stamp.tick
 

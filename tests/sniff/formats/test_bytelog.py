@@ -13,7 +13,7 @@ from dissectors.frame import Chunk, Frame, LineError, Mark
 from dissectors.line import LineSettings
 from sniff.bus.offline import settled
 from sniff.engine.capture import CaptureError
-from sniff.engine.session import with_settings
+from sniff.engine.session import LineEvent, LineEventKind, with_settings
 from sniff.formats import bytelog, read
 from tests.seeds import examples
 
@@ -116,6 +116,40 @@ def test_xxd_is_a_hexdump_too(tmp_path: Path) -> None:
     path = tmp_path / "x.hex"
     path.write_text("00000000: 0103 0000 0002 c40b  ........\n")
     assert [item.octets for item in read(path).items() if isinstance(item, Chunk)] == [REQUEST]
+
+
+@pytest.mark.parametrize("octal", [False, True])
+def test_rows_that_a_dump_leaves_out(octal: bool, tmp_path: Path) -> None:
+    """However many places it leaves out rows in that are as the one above."""
+    octets = (bytes(range(16)) + bytes(64)) * 9
+    rows = [octets[at : at + 16] for at in range(0, len(octets), 16)]
+    lines = []
+    for number, row in enumerate(rows):
+        if number and row == rows[number - 1]:
+            lines += ["*"] * (lines[-1] != "*")
+        else:
+            cells = " ".join(f"{one:03o}" if octal else f"{one:02x}" for one in row)
+            lines.append(f"{16 * number:07o} {cells}" if octal else f"{16 * number:08x}  {cells}")
+    path = tmp_path / "x.txt"
+    path.write_text("\n".join([*lines, f"{len(octets):07o}" if octal else f"{len(octets):08x}", ""]))
+    log = read(path)
+    assert b"".join(item.octets for item in log.items() if isinstance(item, Chunk)) == octets
+    assert log.completeness().whole
+
+
+def test_more_rows_left_out_than_are_read_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / "x.txt"
+    path.write_text(f"00000000  {'00 ' * 16}\n*\n00100000  {'01 ' * 16}\n00100010  02\n")
+    items = list(read(path).items())
+    given = sum(len(item.octets) for item in items if isinstance(item, Chunk))
+    (lost,) = [item for item in items if isinstance(item, LineEvent)]
+    assert (lost.kind, given + lost.count) == (LineEventKind.DROPPED, 0x100011)
+
+
+def test_the_last_digit_of_a_number_with_a_power_is_its_clock(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text("Time [s],Data\n" + "".join(f"{100 + at / 2:.3E},01 03 00 00 00 02 C4 0B\n" for at in range(9)))
+    assert read(path).session.adapter.latency == 100_000_000
 
 
 def test_what_is_no_byte_log_is_refused(tmp_path: Path) -> None:
