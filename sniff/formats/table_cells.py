@@ -136,7 +136,8 @@ def tick_of(text: str, unit: int, times: Times = AS_WRITTEN) -> int | None:
     match = _NUMBER.fullmatch(number)
     if match is not None:
         place = len(match["decimals"] or "") - int(match["power"] or 0)
-        return max(1, unit // 10**place if place >= 0 else unit * 10 ** min(-place, DIGITS))
+        tick: int = unit // 10**place if place >= 0 else unit * 10 ** min(-place, DIGITS)
+        return max(1, tick)
     stamp = stamp_of(text.strip(), times)
     return None if stamp is None or stamp.begin else stamp.tick
 
