@@ -21,7 +21,7 @@ import csv
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import islice
+from itertools import islice, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -215,7 +215,29 @@ class ByteLog:
         first = min((chunk.time - len(chunk.octets) * self.session.line.char for chunk in found), default=0)
         if first < 0:  # counted from a trigger: no time is before 1970
             found = [replace(chunk, time=chunk.time - first) for chunk in found]
-        yield from sorted(found, key=lambda chunk: chunk.time)  # two lines of a bus are listed one after the other
+        if table.exact and table.duration is None:
+            yield from _one_after_another(found, self.session.line.char)
+        else:
+            yield from sorted(found, key=lambda chunk: chunk.time)  # two lines of a bus are listed one after the other
+
+
+def _one_after_another(found: list[Chunk], char: int) -> Iterator[Chunk]:
+    """Reads of which the begin is told, in that order; nobody knows how fast the line was: one of several octets ends
+    before the next begins, and after what began with it."""
+
+    def begin(chunk: Chunk) -> int:
+        return chunk.time - len(chunk.octets) * char
+
+    last = 0
+    for chunk, after in zip_longest(sorted(found, key=begin), sorted(map(begin, found))[1:]):
+        time = chunk.time
+        if len(chunk.octets) > 1:
+            if after is not None and after > begin(chunk):
+                time = min(time, max(after - LINE_END, (begin(chunk) + after) // 2))
+            if begin(chunk) < last:
+                time = last + LINE_END + len(chunk.octets) * char
+        last = max(last, time)
+        yield chunk if last == chunk.time else replace(chunk, time=last)
 
 
 def _as_coarse(adapter: Adapter, tick: int) -> Adapter:

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from dissectors.frame import Chunk, Frame, LineError, Mark
-from dissectors.line import LineSettings
+from dissectors.line import NS_PER_S, LineSettings
 from sniff.bus.offline import settled
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import LineEvent, LineEventKind, with_settings
@@ -110,6 +110,20 @@ def test_only_a_begin_on_the_line_is_an_exact_time(tmp_path: Path) -> None:
     assert read(path).session.adapter.latency == 0
     path.write_text("time,octet\n0.5,01\n")
     assert read(path).session.adapter.latency > 0
+
+
+@pytest.mark.parametrize("step", [0, 4_000_000])
+def test_rows_that_tell_their_begin_stay_in_order(step: int, tmp_path: Path) -> None:
+    """Also where the clock is coarse, or the line faster than is assumed: what is longer did not end later."""
+    reads = [bytes(200), REQUEST, bytes(100), ANSWER]
+    begins = [at // 2 * NS_PER_S + at % 2 * step for at in range(len(reads))]
+    rows = [f"{begin / NS_PER_S:.3f},{octets.hex(' ')}\n" for begin, octets in zip(begins, reads, strict=True)]
+    path = tmp_path / "x.csv"
+    path.write_text("Time [s],Data\n" + "".join(rows))
+    found = [item for item in read(path).items() if isinstance(item, Chunk)]
+    assert [chunk.octets for chunk in found] == reads
+    times = [chunk.time for chunk in found]
+    assert times == sorted(set(times))
 
 
 def test_xxd_is_a_hexdump_too(tmp_path: Path) -> None:
