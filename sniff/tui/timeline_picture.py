@@ -11,7 +11,7 @@ from rich.text import Text
 
 from dissectors.line import NS_PER_S
 from sniff.tui.charts import BARS, tall_bars
-from sniff.tui.times import clock
+from sniff.tui.times import clock, date_and_clock
 
 LABEL = 15
 """Cells left of the charts, their axis among them."""
@@ -138,17 +138,20 @@ def _label(row: Row) -> str:
 
 
 def axis(begin: int, zoom: int, cursor: int, cells: Sequence[int]) -> tuple[str, str]:
-    """The line below the charts, with ticks and the cursor's place, and the times below that line."""
+    """The line below the charts, with ticks and the cursor's place, and the times below that line: dates where there
+    is a day between them."""
     count, width = len(cells), sum(cells)
-    step = next((one for one in TICKS if one * width >= APART * zoom * count and one % zoom == 0), TICKS[-1])
+    others = -(-APART * count // width) * zoom  # where none of the round ones will do
+    step = next((one for one in TICKS if one * width >= APART * zoom * count and one % zoom == 0), others)
     edges = list(accumulate(cells, initial=0))
     line, times = ["─"] * width, [" "] * (width + APART)
     for place, at in enumerate(edges[:-1]):
         second = begin + place * zoom
         if second // step != (second - zoom) // step or place == 0:
             line[at] = "┴"
-            said = clock(second * NS_PER_S)[:8]
-            if at + len(said) <= width + 4 and not "".join(times[max(0, at - 2) : at + 9]).strip():
+            time = second * NS_PER_S
+            said = clock(time)[:8] if step < TICKS[-1] else date_and_clock(time)[:10]
+            if at + len(said) <= width + 4 and not "".join(times[max(0, at - 2) : at + len(said) + 1]).strip():
                 times[at : at + len(said)] = said
     if 0 <= cursor < count:
         line[edges[cursor] + cells[cursor] // 2] = "▲"

@@ -241,8 +241,9 @@ class PollsScreen(TableScreen):
     def _chart(self, poll: Poll) -> Text:
         """How often it was asked over the time of the whole programme, with axes."""
         begin, end = (time // NS_PER_S for time in self._span())
-        room = self.size.width - LABEL - 2
+        room = max(10, self.size.width - LABEL - 2)
         zoom = max(ZOOMS[fitting(end - begin + 1, room)], poll.slices.width // NS_PER_S)
+        zoom *= -(-(end - begin + 1) // (zoom * room))  # no column without a cell
         sums = [0] * ((end - begin) // zoom + 1)
         for place, count in poll.slices.counts.items():
             sums[min(len(sums) - 1, max(0, place * poll.slices.width // NS_PER_S - begin) // zoom)] += count

@@ -34,6 +34,18 @@ def test_the_axis_is_as_wide_as_its_columns() -> None:
     assert line.endswith(("▲", "▲─"))
 
 
+def test_days_are_told_apart() -> None:
+    line, times = axis(0, 3600, -1, [1] * 150)
+    assert line.count("┴") == 7
+    assert times.split() == [f"1970-01-0{day}" for day in range(1, 8)]
+
+
+def test_columns_of_many_days_have_few_ticks() -> None:
+    line, times = axis(0, 9 * 86_400, -1, [1] * 60)
+    assert 3 < line.count("┴") < 7
+    assert times.split()[0] == "1970-01-01"
+
+
 @pytest.mark.parametrize(
     ("noun", "at", "wrong", "shown"), [("station", 4, 72, "station 4   72"), ("station", 247, 123, "247        123")]
 )

@@ -55,6 +55,27 @@ def test_wide_screens_have_more_columns(look: Any) -> None:
     look(store_of("modbus-rtu", 10), script, (120, 40), "polls")
 
 
+def test_the_chart_of_years_has_a_cell_for_each_column(look: Any, make_bus: Any) -> None:
+    """The clock of the recorder was set meanwhile. Nor does a screen without room for it end the program."""
+    bus = make_bus()
+    bus.ask()
+    bus.ask()
+    bus.now += 56 * 365 * 86_400 * 10**9
+    bus.ask(2)
+
+    async def script(see: Any) -> None:
+        chart = see.app.screen._chart(next(iter(see.app.screen._shown.values()))).plain.splitlines()
+        assert max(map(len, chart)) <= 120
+        assert "█" in "".join(chart)
+        await see.pilot.resize_terminal(1, 1)
+        await see.settle()
+        await see.pilot.resize_terminal(80, 24)
+        await see.settle()
+        assert "read to" in see.text()
+
+    look(bus.store, script, (120, 50), "polls")
+
+
 def test_an_empty_bus_says_so(look: Any, make_bus: Any) -> None:
     async def script(see: Any) -> None:
         assert "nobody asked anything" in see.text()
