@@ -57,6 +57,9 @@ _SAYS = 30
 _RULED = re.compile(r"[\s+|:=-]*")
 """What stands between the rows of a table that is drawn."""
 
+_FALLING, _FALLS_LEAST = 4, 8
+"""Times that go back for one that goes on, and how many at least, where the newest line stands first."""
+
 FINE = MS // 100
 """ns: who counts times in less of them may be as exact as any."""
 
@@ -165,6 +168,11 @@ class ByteLog:
         assert self._plan is not None
         read = list(map(self._plan.line, self._plan.margin.joined(lines)))
         stamps = [line.stamp for line in read if line.stamp is not None]
+        order = _Order()
+        for stamp in stamps:
+            order.add(stamp.time)
+        if order.falls >= _FALLS_LEAST and order.is_newest_first and any(one.dated or one.daily for one in stamps):
+            raise CaptureError(f"{self.path}: its times go back from line to line: newest first; turn it (`tac`)")
         if not stamps:
             longest = LINE_END + max((len(line.octets) for line in read), default=0) * SLOW.char
             return replace(adapter, latency=max(TIMELESS, longest), latency_from=NO_TIMES)
@@ -196,6 +204,7 @@ class ByteLog:
         rows = csv.reader(map(plain_signs, islice(self._lines(rows_in), at, None)), delimiter=table.delimiter)
         next(rows, None)
         found: list[Chunk] = []
+        char, order = self.session.line.char, _Order()
         for row in _each(rows):
             if row is None:
                 self._counts.pass_over(at + rows.line_num)
@@ -208,15 +217,19 @@ class ByteLog:
                 self._counts.text += 1
                 continue
             try:
-                found += table.chunks(row, self.session.line.char)
+                told = list(table.chunks(row, char))
+                order.add(told[0].time - len(told[0].octets) * char * table.exact)
+                found += told
                 self._counts.data += 1
             except ValueError:
                 self._counts.pass_over(at + rows.line_num)
-        first = min((chunk.time - len(chunk.octets) * self.session.line.char for chunk in found), default=0)
+        if order.is_newest_first:
+            found.reverse()
+        first = min((chunk.time - len(chunk.octets) * char for chunk in found), default=0)
         if first < 0:  # counted from a trigger: no time is before 1970
             found = [replace(chunk, time=chunk.time - first) for chunk in found]
         if table.exact and table.duration is None:
-            yield from _one_after_another(found, self.session.line.char)
+            yield from _one_after_another(found, char)
         else:
             yield from sorted(found, key=lambda chunk: chunk.time)  # two lines of a bus are listed one after the other
 
@@ -256,6 +269,26 @@ def _each(rows: Iterator[list[str]]) -> Iterator[list[str] | None]:
             yield None
         except StopIteration:
             return
+
+
+class _Order:
+    """How often times go on and back from one to the next."""
+
+    def __init__(self) -> None:
+        self.rises = self.falls = 0
+        self._before: int | None = None
+
+    def add(self, time: int) -> None:
+        """The next."""
+        if self._before is not None:
+            self.rises += time > self._before
+            self.falls += time < self._before
+        self._before = time
+
+    @property
+    def is_newest_first(self) -> bool:
+        """Whether they go back nearly always."""
+        return self.falls > _FALLING * self.rises
 
 
 class _Counts:

@@ -126,6 +126,23 @@ def test_rows_that_tell_their_begin_stay_in_order(step: int, tmp_path: Path) -> 
     assert times == sorted(set(times))
 
 
+@pytest.mark.parametrize("heading", ["Time", "Time [s]"])
+def test_a_table_whose_newest_row_is_the_first(heading: str, tmp_path: Path) -> None:
+    """What has the same time was listed the other way round, too."""
+    rows = [f"{at},{octets.hex(' ')}\n" for at in range(9) for octets in (REQUEST, ANSWER)]
+    path = tmp_path / "x.csv"
+    path.write_text(f"{heading},Data\n{''.join(rows[::-1])}")
+    assert [item.octets for item in read(path).items() if isinstance(item, Chunk)] == [REQUEST, ANSWER] * 9
+
+
+def test_a_log_whose_newest_line_is_the_first_is_refused(tmp_path: Path) -> None:
+    lines = [f"2026-03-01 10:00:{at:02d} {octets.hex(' ')}\n" for at in range(30) for octets in (REQUEST, ANSWER)]
+    path = tmp_path / "x.log"
+    path.write_text("".join(lines[::-1]))
+    with pytest.raises(CaptureError, match="newest first"):
+        read(path)
+
+
 def test_xxd_is_a_hexdump_too(tmp_path: Path) -> None:
     path = tmp_path / "x.hex"
     path.write_text("00000000: 0103 0000 0002 c40b  ........\n")
