@@ -135,7 +135,7 @@ def to_json(port: str, outcome: Outcome) -> dict[str, object]:
     """One object; keys and their order are a promise."""
     reading = outcome.reading
     return {
-        "source": port,
+        "port": port,
         "outcome": outcome.ending.value,
         "line": None if reading is None else str(reading.line),
         "protocol": None if reading is None else reading.protocol,
