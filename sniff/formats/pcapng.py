@@ -14,14 +14,25 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
-from dissectors.line import LineSettings
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.session import NO_TIMES_OF_PACKETS, Completeness, Item, LineEvent, LineEventKind, Session
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, USER1
 from sniff.formats.network import NETWORK
 from sniff.formats.pcapng_interface import OPT_END, OPT_TSRESOL, Interface, interface_of, options
-from sniff.formats.records import PacketRecord, SearchMarks, cut_off, foreign_session, items_of, protocol_of
+from sniff.formats.pcapng_packet import (
+    CRC_ERROR_FLAG,
+    ENHANCED,
+    LATEST,
+    MARK,
+    OBSOLETE,
+    OPT_COMMENT,
+    OPT_FLAGS,
+    SEARCH_MARK,
+    SIMPLE,
+    packet_of,
+)
+from sniff.formats.records import PacketRecord, SearchMarks, foreign_session, items_of, protocol_of
 from sniff.formats.timeless import IN_PACKETS, Laid
 from sniff.formats.usb import USB
 
@@ -30,24 +41,17 @@ if TYPE_CHECKING:
     from sniff.engine.blocks import Block
     from sniff.formats.pcapng_walk import PlainPackets
 
-SECTION, INTERFACE, OBSOLETE, SIMPLE, ENHANCED = 0x0A0D0D0A, 1, 2, 3, 6
+SECTION, INTERFACE = 0x0A0D0D0A, 1
 BYTE_ORDER = 0x1A2B3C4D
-OPT_COMMENT, OPT_NAME, OPT_FLAGS = 1, 2, 2
-CRC_ERROR_FLAG = 1 << 24
+OPT_NAME = 2  # of an interface
 LONGEST = 4 * 1024 * 1024
 """A longer block is damage."""
 SEEN_OF_NETWORK = 1000
 """Packets of a network or of USB before any serial frame, from which on it is a capture of such."""
-LATEST = (1 << 33) * 1_000_000_000
-"""ns since the epoch, in the year 2242; a record that says more, or as much before it, is given this time."""
 LONGEST_OPTION = 60_000
 """Octets of a text in an option, whose length has sixteen bits."""
 _SHORT = 200
 SESSION_MARK = "sniff485 session: "
-MARK = "mark: "
-"""Begins a comment of a packet that a person wrote; what follows is theirs."""
-SEARCH_MARK = "sniff485 search: "
-"""Begins a comment of a packet that was heard in a search for settings; the line settings tried follow."""
 
 
 def read(path: Path) -> Capture:
@@ -155,15 +159,15 @@ class PcapngCapture:
         return record.mark if record.mark is not None or self._metadata else record.comment or None
 
     def _commented(self, packets: PlainPackets, interfaces: list[Interface]) -> set[int]:
-        """The places of packets that a person wrote about."""
+        """The places of packets that a person wrote about, or before which others were dropped."""
         if self._metadata and MARK.encode() not in packets.window:
             return set()
         kept = packets.heads[:, 5].astype("i8")
         options = packets.heads[:, 1] - 32 - kept - -kept % 4
         found = set()
         for index in (options > 4).nonzero()[0].tolist():
-            record = _packet(packets.order, ENHANCED, packets.body(index), interfaces)
-            if record is not None and self._written(record) is not None:
+            record = packet_of(packets.order, ENHANCED, packets.body(index), interfaces)
+            if record is not None and (record.dropped or self._written(record) is not None):
                 found.add(index)
         return found
 
@@ -206,7 +210,7 @@ class PcapngCapture:
             is_said = any(first <= index < end for index in commented)
             if some is None or end - first < LEAST_RUN or marks.searching or is_said:
                 for index in range(first, end):
-                    record = _packet(packets.order, ENHANCED, packets.body(index), interfaces)
+                    record = packet_of(packets.order, ENHANCED, packets.body(index), interfaces)
                     if record is not None:
                         yield from self._items(record, marks)
             else:
@@ -229,7 +233,7 @@ class PcapngCapture:
         elif kind == INTERFACE and len(body) >= 8:
             interfaces.append(interface_of(order, body))
         elif kind in (ENHANCED, SIMPLE, OBSOLETE):
-            record = _packet(order, kind, body, interfaces)
+            record = packet_of(order, kind, body, interfaces)
             if record is not None and kind == SIMPLE:
                 self._is_timeless = True
                 return replace(record, time=self._laid.end_of(len(record.data)))
@@ -274,49 +278,6 @@ class PcapngCapture:
                     self._metadata = {str(key): str(item) for key, item in found.items()}
 
 
-def _packet(order: str, kind: int, body: bytes, interfaces: list[Interface]) -> PacketRecord | None:
-    if kind == SIMPLE:
-        if len(body) < 4 or not interfaces:
-            return None
-        on_wire = struct.unpack_from(order + "I", body)[0]
-        data = body[4 : 4 + min(on_wire, interfaces[0].longest)]
-        return PacketRecord(0, interfaces[0].link_type, data, cut=cut_off(len(data), on_wire))
-    if len(body) < 20:
-        return None
-    number, high, low, kept, on_wire = struct.unpack_from(order + "IIIII", body)
-    if kind == OBSOLETE:  # number of the interface, and how many packets were dropped before
-        number = struct.unpack_from(order + "H", body)[0]
-    if number >= len(interfaces) or kept > len(body) - 20:
-        return None
-    interface = interfaces[number]
-    factor, ticks = interface.resolution
-    time = ((high << 32) | low) * factor // ticks + interface.offset * 1_000_000_000
-    time = max(-LATEST, min(time, LATEST))
-    comment, crc_error, searched, mark = "", False, None, None
-    for code, value in options(order, body[20 + kept + (-kept % 4) :]):
-        if code == OPT_COMMENT:
-            text = value.decode("utf-8", "replace")
-            if text.startswith(SEARCH_MARK):
-                searched = _line(text[len(SEARCH_MARK) :])
-            elif text.startswith(MARK):
-                mark = text[len(MARK) :]
-            elif comment:  # we write one at most: another program has added this
-                mark = text
-            else:
-                comment = text
-        elif code == OPT_FLAGS and len(value) == 4:
-            crc_error = bool(struct.unpack(order + "I", value)[0] & CRC_ERROR_FLAG)
-    data, cut = body[20 : 20 + kept], cut_off(kept, on_wire)
-    return PacketRecord(time, interface.link_type, data, comment, crc_error, searched, mark, cut)
-
-
-def _line(text: str) -> LineSettings | None:
-    try:
-        return LineSettings.parse(text)
-    except ValueError:
-        return None
-
-
 def create(path: Path, session: Session, link_type: int, live: bool = False) -> PcapngWriter:
     """Create a pcapng file whose frames are of one link type. Raises CaptureError."""
     return PcapngWriter(path, session, link_type, live)
@@ -345,7 +306,7 @@ class PcapngWriter:
     def put(self, records: Iterable[PacketRecord]) -> None:
         """Add records."""
         for record in records:
-            self._packet(record)
+            self.packet_of(record)
         self._flush()
 
     def close(self) -> None:
@@ -370,7 +331,7 @@ class PcapngWriter:
         if self._live:
             self._file.stream.flush()
 
-    def _packet(self, record: PacketRecord) -> None:
+    def packet_of(self, record: PacketRecord) -> None:
         time, size = max(0, record.time), len(record.data)
         number = 1 if record.link_type == USER1 else 0
         options = _option(OPT_FLAGS, struct.pack("<I", CRC_ERROR_FLAG)) if record.crc_error else b""

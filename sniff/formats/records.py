@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Protocol
 
 from dissectors import registry
+from dissectors.findings import counted
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.engine.session import (
@@ -53,7 +54,8 @@ class PacketRecord:
 
     `searched`: line settings that a search listened with when these octets were heard; None outside a search. `mark`:
     what a person wrote about it, None for nothing. `cut`: octets at its end that were on the wire and are not in the
-    file, since only so many of a packet were kept; -1 for nobody knows how many.
+    file, since only so many of a packet were kept; -1 for nobody knows how many. `dropped`: packets before it that
+    whoever captured dropped.
     """
 
     time: int
@@ -64,6 +66,7 @@ class PacketRecord:
     searched: LineSettings | None = None
     mark: str | None = None
     cut: int = 0
+    dropped: int = 0
 
 
 class FrameFile(Protocol):
@@ -135,6 +138,9 @@ def items_of(record: PacketRecord, protocol: str) -> Iterator[Item]:
     if decoded.event:
         dropped = decoded.event == "dropped"
         yield LineEvent(record.time, LineEventKind.DROPPED if dropped else LineEventKind.ERRORS, decoded.event, 1)
+    if record.dropped:
+        words = f"{counted(record.dropped, 'packet')} dropped by who captured"
+        yield LineEvent(record.time, LineEventKind.DROPPED, words, -1)
     if decoded.octets:
         yield Chunk(record.time, decoded.octets)
     if record.cut:

@@ -18,8 +18,9 @@ from dissectors.line import LineSettings
 from sniff.bus.capture_writer import create
 from sniff.bus.offline import settled
 from sniff.cli import main
+from sniff.engine.blocks import Block
 from sniff.engine.capture import CaptureError
-from sniff.engine.session import Adapter, LineEvent, Session, SettingsChange, settings_change
+from sniff.engine.session import Adapter, LineEvent, LineEventKind, Session, SettingsChange, settings_change
 from sniff.formats import read
 from sniff.formats.linktypes import USER1
 from sniff.formats.pcapng import PcapngWriter
@@ -299,3 +300,29 @@ def test_times_in_microseconds_for_readers_that_know_no_nanoseconds(tmp_path: Pa
     assert [chunk.octets for chunk in one] == [chunk.octets for chunk in two]
     assert [chunk.time // 1000 * 1000 for chunk in one] == [chunk.time for chunk in two]
     assert main(["convert", str(source), str(tmp_path / "x.pcapng"), "--microseconds"]) == 2
+
+
+def test_packets_that_the_capturing_host_dropped_are_a_hole_before_the_next(tmp_path: Path) -> None:
+    head = struct.pack("<IIII", 0, 0, 1000, len(POLL)) + struct.pack("<I", len(POLL)) + POLL + b"\0" * (-len(POLL) % 4)
+    dropped = head + option(4, struct.pack("<Q", 3)) + option(0)
+    old = struct.pack("<HHIIII", 0, 2, 0, 2000, len(POLL), len(POLL)) + POLL + b"\0" * (-len(POLL) % 4)
+    unsaid = struct.pack("<HHIIII", 0, 0xFFFF, 0, 3000, len(POLL), len(POLL)) + POLL + b"\0" * (-len(POLL) % 4)
+    path = tmp_path / "dropped.pcapng"
+    write_anew(
+        path,
+        block(0x0A0D0D0A, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1))
+        + block(1, struct.pack("<HHI", 147, 0, 0) + option(0))
+        + block(6, head) * 40
+        + block(6, dropped)
+        + block(6, head) * 40
+        + block(2, old)
+        + block(2, unsaid),
+    )
+    capture = read(path)
+    row_by_row = list(capture.items())
+    holes = [at for at, item in enumerate(row_by_row) if not isinstance(item, Chunk)]
+    assert holes == [40, 82]
+    assert [row_by_row[at].text for at in holes] == [f"{n} packets dropped by who captured" for n in (3, 2)]
+    assert all(row_by_row[at].kind is LineEventKind.DROPPED and row_by_row[at].count == -1 for at in holes)
+    parts = (one.chunks() if isinstance(one, Block) else [one] for one in capture.blocks())
+    assert [item for part in parts for item in part] == row_by_row
