@@ -280,6 +280,11 @@ class LineFindings:
             return None
         return lacking_bits(self._sample, self._session.line, self._values, self._damaged, self._rows)
 
+    def lasting_silence(self, now: int) -> Finding | None:
+        """That a bus which is listened to has fallen silent by `now` (ns); None where nobody can say so."""
+        is_timed = self._session.has_times and self._unplugged_at is None and not self.heard.is_rubbish
+        return self._patterns.lasting_silence(now) if is_timed else None
+
     def judgement(self) -> Judgement:
         """All findings so far, as a value that merges."""
         heard, host = self.heard, (self._can_tell(), *self._of_host())

@@ -258,7 +258,8 @@ _ALL = (
         "silent for a while",
         "Not one octet for 3 s or more (10 s behind a request) and 30 times as long as all but 2 in 100 pauses, in the "
         "middle of traffic that goes on as before; not where such pauses are regular, and not where octets were lost "
-        "or the adapter was away.",
+        "or the adapter was away. Of a bus that is listened to also while it lasts, from a minute on that is twice as "
+        "long as any silence before.",
         "the master stopped: a restart, a busy controller, a changeover, a program that was loaded",
         "the master's log and watchdog at that time",
         explains=("MS101",),

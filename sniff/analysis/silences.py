@@ -1,14 +1,16 @@
-"""Silences of a bus that is never silent, with everything as before behind them. Pure, bounded."""
+"""Silences of a bus that is never silent, with everything as before behind them, or that last. Pure, bounded."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Tally
 from dissectors.frame import Event
 from dissectors.histogram import Histogram
 from dissectors.line import MS, NS_PER_S
+from dissectors.words import duration
 from sniff.analysis.line_rules import LINE_RULES as RULES
 
 if TYPE_CHECKING:
@@ -18,6 +20,11 @@ if TYPE_CHECKING:
 SILENT_LEAST = 3 * NS_PER_S
 SILENT_WAITING = 10 * NS_PER_S
 """The same behind a request: a master may wait so long for an answer."""
+
+SILENT_NOW = 60 * NS_PER_S
+"""The same of a silence that lasts: nobody knows yet whether everything goes on as before."""
+
+_NEXT = "whether the master runs and has its supply; the wiring from the bus to this tap"
 
 SILENT_TIMES = 30
 SILENT_KEPT = 8
@@ -33,6 +40,7 @@ class Silences:
         self._rows = 0
         self._gaps = Histogram()
         self._silences: list[tuple[int, int, int]] = []  # begin, end, rows before
+        self._longest = 0  # of all that were long, ns
         self._hole: int | None = None  # ns; no row has ended since
         self._asked = False  # the newest row is a request
 
@@ -73,6 +81,7 @@ class Silences:
         self._hole = time
 
     def _see_gap(self, gap: int, asked: bool, silence: tuple[int, int, int]) -> None:
+        self._longest = max(self._longest, gap)
         long = gap >= (SILENT_WAITING if asked else SILENT_LEAST)
         if long and self._hole is None and len(self._silences) < 20 * SILENT_KEPT:
             self._silences.append(silence)
@@ -88,6 +97,20 @@ class Silences:
         if not whole or len(long) > SILENT_KEPT or _is_regular([end - begin for begin, end, _ in long]):
             return []
         return whole
+
+    def lasting(self, now: int) -> Finding | None:
+        """That nothing came any more up to `now` (ns), for longer than ever before, on a bus that is listened to."""
+        usual, silence = self._gaps.quantile(0.98), now - self.now
+        if usual is None or self._hole is not None or self._rows < ROWS_AROUND:
+            return None
+        if silence < max(SILENT_NOW, SILENT_TIMES * usual, 2 * self._longest):
+            return None
+        tally = Tally()
+        tally.add(self.now, self._rows)
+        often = silence // max(usual, MS)
+        seen = f"not one octet for {duration(silence)} by now, {often} times as long as pauses were here"
+        told = tally.found(RULES["LN304"], "bus", seen)
+        return replace(told, means=f"{told.means}; or this tap came off the line", next=_NEXT, last=now, lasts=True)
 
     def findings(self) -> Iterator[Finding]:
         """What there is to say so far."""

@@ -280,6 +280,10 @@ class TimePatterns:
         yield from self._silences.findings()
         yield from self._lost.findings(self._silences.first or 0, self._silences.now)
 
+    def lasting_silence(self, now: int) -> Finding | None:
+        """See `Silences.lasting`."""
+        return self._silences.lasting(now)
+
     def stops(self) -> list[Stop]:
         """What stopped all at once so far: the whole bus, or stations of it."""
         silent = [Stop(begin, begin, end) for begin, end, _ in self._silences.whole()]

@@ -126,7 +126,7 @@ class LiveBus:
         self._nodes_budget = Budget(NODES_A_SECOND, NODES_AT_ONCE)
         self._listener: BusListener | None = None
         self.model = BusModel(self.session, self.dissector, self.devices, with_points=watched)
-        self.model.is_early = self._is_early
+        self.model.is_early, self.model.listened_until = self._is_early, self._listened_until
         self.ear = SiteEar()
         self._settle()
 
@@ -157,6 +157,9 @@ class LiveBus:
 
     def _is_early(self) -> bool:
         return self.link.clock.now() - self.session.started < LISTENED
+
+    def _listened_until(self) -> int | None:
+        return self.now if self.ended is None else None
 
     @property
     def searching(self) -> SearchProgress | None:

@@ -33,12 +33,17 @@ def _never() -> bool:
     return False
 
 
+def _nobody() -> None:
+    return None
+
+
 class BusModel:
     """What is counted, found and measured on one bus.
 
     `summary`: counts, stations, load. `judging`: the rules. `samples`: values that the newest output completed.
     `version` changes whenever anything changed. `reads_points`: whether values and requests are read at all.
-    `is_early`: of a live bus, whether it was listened to for so short a time that silence says nothing of it.
+    `is_early`: of a live bus, whether it was listened to for so short a time that silence says nothing of it;
+    `listened_until`: ns, up to when, None where nobody listens.
     """
 
     def __init__(
@@ -55,6 +60,7 @@ class BusModel:
         self.summary = Summary(session.line, kept_seconds=kept_seconds)
         self.samples: list[Sample] = []
         self.is_early: Callable[[], bool] = _never
+        self.listened_until: Callable[[], int | None] = _nobody
         self.version = 0
         self._use(session, dissector)
 
@@ -160,7 +166,9 @@ class BusModel:
             self._found = self.version, found
         if found and not self.summary.octets and self.is_early():
             return tuple(one for one in found if one.code != NOTHING_HEARD)
-        return found
+        now = self.listened_until()
+        silent = None if now is None else self.judging.line.lasting_silence(now)
+        return found if silent is None else _among(found, silent)
 
     def health(self) -> HealthReport:
         """How the bus and its stations fare."""
@@ -174,3 +182,10 @@ class BusModel:
         """What is new in it since this was called the last time; the first time is not told of. None where no token is
         passed."""
         return self.judging.ring_window()
+
+
+def _among(found: tuple[Finding, ...], one: Finding) -> tuple[Finding, ...]:
+    """Findings with one more at its place, which takes that of one about the same."""
+    others = [other for other in found if other.key != one.key]
+    place = next((at for at, other in enumerate(others) if other.severity < one.severity), len(others))
+    return (*others[:place], one, *others[place:])

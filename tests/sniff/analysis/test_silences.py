@@ -33,3 +33,28 @@ def test_rows_that_a_hole_ended_do_not_close_it(is_hole: bool, by_columns: bool)
     for number in range(100):
         _row(silences, 60 * NS_PER_S + number * EVERY, by_columns)
     assert bool(silences.whole()) != is_hole
+
+
+@pytest.mark.parametrize("by_columns", [False, True])
+def test_a_silence_that_lasts_is_told_of_a_bus_that_is_listened_to(by_columns: bool) -> None:
+    silences = Silences()
+    for number in range(100):
+        _row(silences, number * EVERY, number > 0 and by_columns)
+    last = silences.now
+    assert silences.lasting(last + 59 * NS_PER_S) is None
+    told = silences.lasting(last + 150 * NS_PER_S)
+    assert told is not None
+    assert (told.code, told.first, told.last, told.lasts) == ("LN304", last, last + 150 * NS_PER_S, True)
+    assert told.seen.startswith("not one octet for 150 s by now")
+    _row(silences, last + 150 * NS_PER_S, by_columns)  # it was silent before
+    assert silences.lasting(silences.now + 290 * NS_PER_S) is None
+    assert silences.lasting(silences.now + 310 * NS_PER_S) is not None
+    silences.miss(silences.now + NS_PER_S)
+    assert silences.lasting(silences.now + 3600 * NS_PER_S) is None
+
+
+def test_of_a_bus_that_hardly_spoke_silence_says_nothing() -> None:
+    silences = Silences()
+    for number in range(40):
+        _row(silences, number * EVERY, by_columns=False)
+    assert silences.lasting(silences.now + 3600 * NS_PER_S) is None
