@@ -9,6 +9,7 @@ from dissectors.late_speakers import Due
 from dissectors.modbus.envelope import ASCII_NAME
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, ITEMS_ASKED, answer_length
 from dissectors.modbus.notation import CHECK, HEAD
+from dissectors.modbus.poll_order import Asked
 from dissectors.modbus.station_record import Key
 from dissectors.quick_values import quickly_made
 
@@ -38,6 +39,11 @@ class AskedRequest:
     def key(self) -> Key:
         """What it asks for, as a poll list has it."""
         return self.header.kind, self.header.address
+
+    @property
+    def in_list(self) -> Asked:
+        """The same, with whom it asks."""
+        return self.unit, self.key
 
     @property
     def due(self) -> Due:

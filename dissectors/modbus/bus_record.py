@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dissectors.chances import is_rare
-from dissectors.findings import Tally
+from dissectors.findings import Tally, together
 from dissectors.frame import Flaw
 from dissectors.late_speakers import LateSpeakers
 from dissectors.line import MS, Timing
+from dissectors.modbus.poll_order import Neighbours
 from dissectors.modbus.station_record import Cycles, StationRecord
 from dissectors.rhythm import Rhythm
 from dissectors.strikes import Strikes
@@ -30,6 +31,7 @@ _AGAIN_SOON = 150 * MS  # hardly a master repeats sooner
 _UNHEARD_LEAST = 3
 _CLOSE_KEPT = 4096
 _HASTY_KEPT = 256
+_CROSSED_KEPT = 256
 _WORDS_KEPT = 16
 _LATE_KEPT = 4096
 
@@ -37,9 +39,9 @@ PAUSE_MARGIN = 5
 """So many times the adapter's delay must fit into 1.5 characters before pauses inside frames are judged."""
 
 
-Hasty = tuple[int, int, int, int, int]
+Hasty = tuple[int, int, int, int, int, tuple[Neighbours, ...]]
 """A request after another that nothing had followed: the longest reading of the silence between (ns), the unit asked
-before, time, frame before, frame."""
+before, time, frame before, frame; where it has the shape of an answer, too, the order in which that was a late one."""
 
 
 def _no_words(unit: int, code: int) -> str:
@@ -79,7 +81,7 @@ class BusRecord:
     `held_back`: of the paused frames, those that an adapter may have made so that nobody named.
     `damaged_here`: damaged requests that were answered all the same.
     `again`: requests that were answered when they came a second time.
-    `crossed`: answers to the request before the newest, which came sooner than a turn takes.
+    `crossed`: answers to the request before the newest, which came sooner than a turn takes; by what may follow what.
     `asked_twice`: second answers to requests that were heard twice, one directly behind the other.
     `malformed`: requests that cannot be carried out, with the exceptions they got, and how many got nothing.
     `to_nobody`: reads of address 0, and who answered. `cut_echoes`: requests given back in part.
@@ -105,7 +107,7 @@ class BusRecord:
     unasked: Tally = field(default_factory=Tally)
     unasked_behind_noise: int = 0
     again: Again = field(default_factory=Again)
-    crossed: Tally = field(default_factory=Tally)
+    crossed: dict[tuple[Neighbours, ...], Tally] = field(default_factory=dict)
     asked_twice: Tally = field(default_factory=Tally)
     answers_to_broadcast: Tally = field(default_factory=Tally)
     noise_after_broadcast: Tally = field(default_factory=Tally)
@@ -236,10 +238,25 @@ class BusRecord:
             self.too_many |= bool(self.too_hasty([row]))
 
     def too_hasty(self, rows: list[Hasty]) -> list[Hasty]:
-        """Those that came sooner than the station asked before has ever answered, which is there; no late answers."""
+        """Those that came sooner than the station asked before has ever answered, which is there; no late answers, and
+        not what has the shape of one to what is asked before that station as a rule."""
         units = {row[1]: self.stations[row[1]] for row in rows if row[1] in self.stations}
         soonest = {u: s.times.soonest() for u, s in units.items() if s.answered >= 3 and 2 * s.answered > s.asked}
-        return [row for row in rows if 10 * row[0] < 9 * soonest.get(row[1], 0) and row[4] not in self.late_frames]
+        soon = [row for row in rows if 10 * row[0] < 9 * soonest.get(row[1], 0) and row[4] not in self.late_frames]
+        return [row for row in soon if not any(self.cycles.order.is_usual(*two) for two in row[5])]
+
+    def cross(self, neighbours: tuple[Neighbours, ...], time: int, *frames: int | None) -> None:
+        """Note one more of `crossed`."""
+        if neighbours in self.crossed or len(self.crossed) < _CROSSED_KEPT:
+            self.crossed.setdefault(neighbours, Tally()).add(time, *frames)
+
+    @property
+    def crossed_by_another(self) -> Tally:
+        """Those of `crossed` that are not in the order in which one master asks, which may not have waited. None where
+        these are no more than twice the rest: damage hides requests, and what is beside what, too."""
+        order, every = self.cycles.order, together(self.crossed.values())
+        by_others = together(one for two, one in self.crossed.items() if not any(order.is_usual(*pair) for pair in two))
+        return by_others if 3 * by_others.count > 2 * every.count else Tally()
 
     def late(self, no: int | None) -> None:
         """Note an answer that came too late."""

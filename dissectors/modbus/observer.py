@@ -19,6 +19,7 @@ from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.learned_timing import READ
 from dissectors.modbus.limits import ILLEGAL, beyond_limits
 from dissectors.modbus.pairing import is_answer
+from dissectors.modbus.poll_order import Neighbours
 from dissectors.modbus.remembered import FINAL_KEPT, LOST_KEPT, OPEN_KEPT, SLOW_UNLEARNT, Unfit, slow_limit
 from dissectors.modbus.response_groups import AnsweredRequest
 from dissectors.modbus.row_observer import AT_ONCE, STRAY_KEPT, RowObserver
@@ -275,8 +276,8 @@ class ModbusFindings(RowObserver):
             else:
                 self.seen.malformed_codes[code or 0] += 1
         elif transaction.error is not None and asked.header.ok and self._is_unfit(transaction, asked, code, answer):
-            if is_disturbed and self._answers_another(transaction, asked, answer):
-                self.seen.crossed.add(transaction.end, transaction.request, transaction.response)
+            if is_disturbed and (ways_round := self._answers_another(transaction, asked, answer)):
+                self.seen.cross(ways_round, transaction.end, transaction.request, transaction.response)
                 return
             unfit = Unfit(station, transaction, answer)
             if self.timing.latency < AT_ONCE or asked.header.role is Role.REQUEST:
@@ -304,12 +305,12 @@ class ModbusFindings(RowObserver):
             return True
         return bool(answer) and not is_answer(asked.octets, answer)
 
-    def _answers_another(self, transaction: Transaction, asked: AskedRequest, answer: bytes) -> bool:
-        """Whether an answer fits what that station is asked besides, and there was no time for a turn in between: the
-        octets before it hide a request that came while this one waited."""
+    def _answers_another(self, transaction: Transaction, asked: AskedRequest, answer: bytes) -> tuple[Neighbours, ...]:
+        """What an answer fits besides that came too soon for a turn: octets before hide its request, or it is late."""
         turn = self.learnt.turn(asked.unit, asked.answer_time(self.timing.char))
-        soon = turn is not None and transaction.latency is not None and transaction.latency.nominal <= turn[1]
-        return soon and any(is_answer(other, answer) for other in self.seen.cycles.asked_of(asked.unit))
+        if turn is None or transaction.latency is None or transaction.latency.nominal > turn[1]:
+            return ()
+        return self.seen.cycles.beside(asked.in_list, answer)
 
     def _compare_with_timeout(self, station: StationRecord, transaction: Transaction, least: int) -> None:
         """Whether an answer took long; counted anew when the timeout gets known, since the limit is another then."""
@@ -325,11 +326,11 @@ class ModbusFindings(RowObserver):
         lost = self.lost.pop(transaction.of or 0, None)
         if lost is not None:
             station.forgive(lost)
-            waited, ended_by = self.waits.get(lost.no, (AT_ONCE, None))
+            waited, ended_by, neighbours = self.waits.get(lost.no, (AT_ONCE, None, ()))
             if ended_by in self.seen.late_frames:
                 return  # what ended the wait was no request, but another late answer
             if lost.no in self.hasty:
-                self.seen.crossed.add(transaction.start, lost.no, transaction.response)
+                self.seen.cross(neighbours, transaction.start, lost.no, transaction.response)
                 return
             timeout = self.learnt.timeout
             if waited < (_NO_WAIT if timeout is not None and timeout < 2 * AT_ONCE else AT_ONCE):

@@ -15,6 +15,7 @@ from dissectors.modbus.late_rows import LateRows
 from dissectors.modbus.learned_timing import LearnedTiming
 from dissectors.modbus.long_silences import LongSilences
 from dissectors.modbus.odd_ends import OddEnds
+from dissectors.modbus.poll_order import Neighbours
 from dissectors.modbus.second_answers import SecondAnswer
 from dissectors.modbus.station_record import Lost, StationRecord
 from dissectors.modbus.torn import TornFrames
@@ -30,6 +31,8 @@ FINAL_KEPT = 64
 BEGIN = 5
 """Octets of a request that no noise makes by chance: unit, function, address, half a quantity."""
 
+Wait = tuple[int, int, tuple[Neighbours, ...]]
+"""From a request to the next one, ns; that one, and in which order the two may be asked."""
 
 _WORDS_KEPT = 16
 
@@ -92,7 +95,7 @@ class Remembered:
         self.torn = TornFrames()
         self.bad_ends: dict[int, tuple[int, int, Frame]] = {}  # damaged answers (station, row), by transaction
         self.marked: deque[int] = deque(maxlen=64)  # transactions with line errors in what came in answer
-        self.waits: dict[int, tuple[int, int]] = {}  # by request that nothing followed: ns until the next one, and that
+        self.waits: dict[int, Wait] = {}  # by request that nothing followed
         self.unheard: deque[int] = deque(maxlen=LOST_KEPT)  # requests after which the master went on as after answers
         self.waited_for: deque[int] = deque(maxlen=LOST_KEPT)  # those for which it waited longer than that
         self.hasty: deque[int] = deque(maxlen=LOST_KEPT)  # those after which another came sooner than that

@@ -143,10 +143,11 @@ class RowObserver(Remembered):
         if turn is not None:
             kind = self.hasty if gap < turn[0] else self.unheard if gap <= turn[1] else self.waited_for
             kind.append(before.no)
-        self.waits[before.no] = gap, asked.no
+        late = () if asked.header.role is Role.REQUEST else ((asked.in_list, before.in_list),)
+        self.waits[before.no] = gap, asked.no, ((before.in_list, asked.in_list), *late)
         if len(self.waits) > LOST_KEPT:
             del self.waits[next(iter(self.waits))]
-        row = gap + before.frame.slack, before.unit, asked.frame.start, before.no, asked.no
+        row = gap + before.frame.slack, before.unit, asked.frame.start, before.no, asked.no, late
         self.seen.broke_in(self.seen.hasty, row)
 
     def _see_answer(self, no: int, frame: Frame, header: Header, placement: Placement, octets: bytes) -> None:
@@ -223,7 +224,7 @@ class RowObserver(Remembered):
         if asked is None or begin not in self.begins or begin[0] == asked.unit:
             return
         gap = max(0, event.start - asked.frame.end)
-        row = gap + asked.frame.slack, asked.unit, event.start, asked.no, no
+        row = gap + asked.frame.slack, asked.unit, event.start, asked.no, no, ()
         self.seen.broke_in(self.seen.broken_in, row)
 
     def _is_cut_echo(self, no: int, event: Event) -> bool:

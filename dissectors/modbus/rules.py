@@ -113,8 +113,9 @@ _ALL = (
         "Requests that come while another one waits for a station that is alive, sooner than that station ever answers "
         "(what seems an answer to the second of two masters and is one to the first aside), so that no answer can have "
         "been missed; or the same request twice at once, and an answer to each; or one between another and its answer, "
-        "which came no later than answers do. At least three; not where "
-        "they always come after the same time, as those of a single master do that never waits.",
+        "which came no later than answers do. At least three; not where they always come after the same time, as those "
+        "of a single master do that never waits, nor where the one between is what comes next, or was asked before, in "
+        "the order of one master whose timeout is too short.",
         "two masters on one bus, or a commissioning tool left connected",
         "find the second master; a bus has one, use a gateway or multiplexer for more",
         explains=(*_OF_COLLISIONS, "MB020", "MB002", "MB003", "MB201", "MB202", "MB302"),

@@ -217,7 +217,7 @@ def _of_masters(seen: BusRecord) -> Iterator[Finding]:
         yield from list(_asked_twice(seen)) or _crossed(seen)
         return
     tally = Tally()
-    for _, _, time, before, no in sorted((*hasty, *broken_in), key=lambda row: row[2]):
+    for _, _, time, before, no, _ in sorted((*hasty, *broken_in), key=lambda row: row[2]):
         tally.add(time, before, no)
     many = f"over {len(gaps)}" if seen.too_many else len(gaps)
     words = f"{many} requests came while another one waited for a station that answers, and never so soon"
@@ -241,8 +241,9 @@ def _asked_twice(seen: BusRecord) -> Iterator[Finding]:
 
 def _crossed(seen: BusRecord) -> Iterator[Finding]:
     """Requests between another and its answer, which came no later than answers do: where the adapter's reads hide how
-    soon a request came, the order of the frames still tells. A master that never waits sends all its requests so."""
-    crossed = seen.crossed
+    soon a request came, the order of the frames still tells. A master that never waits sends all its requests so, and
+    one whose timeout is too short the next of its list."""
+    crossed = seen.crossed_by_another
     if crossed.count >= _MASTERS_LEAST and _HABIT * crossed.count < seen.requests:
         words = f"{counted(crossed.count, 'request')} came between another one and its answer, which was not late"
         yield crossed.found(RULES["MB203"], "bus", words)

@@ -10,6 +10,8 @@ from itertools import pairwise
 from dissectors.findings import Tally
 from dissectors.frame import Flaw
 from dissectors.modbus.garbage import Garbage
+from dissectors.modbus.pairing import is_answer
+from dissectors.modbus.poll_order import Asked, Neighbours, PollOrder
 from dissectors.modbus.response_groups import AnsweredRequest, SameRequest
 from dissectors.tracker import Interval
 from dissectors.wrong_checks import Habit, WrongChecks
@@ -289,14 +291,16 @@ class StationRecord:
 
 @dataclass(slots=True)
 class Cycles:
-    """Time from a request to the same request again, of the most frequent ones."""
+    """Time from a request to the same request again, of the most frequent ones, and which of them follow which."""
 
     _last: dict[bytes, int] = field(default_factory=dict)
     _keys: dict[bytes, Key] = field(default_factory=dict)
     _periods: dict[bytes, deque[int]] = field(default_factory=dict)
+    order: PollOrder = field(default_factory=PollOrder)
 
     def add(self, octets: bytes, key: Key, start: int) -> None:
         """Take a request (unit and PDU) that is no repeat of an unanswered one."""
+        self.order.add((octets[0] if octets else 0, key))
         before = self._last.get(octets)
         if before is None and len(self._last) >= KEYS_KEPT:
             return
@@ -310,8 +314,8 @@ class Cycles:
         periods.append(start - before)
 
     def again(self, octets: bytes, key: Key, starts: list[int]) -> tuple[int, list[int]] | None:
-        """Take one request that came several times, in order; its periods, which are to be kept in the order in which
-        the first of each ended, and at which of the starts that was. None where it has none."""
+        """Take one request that came several times, in order (`order` apart); its periods, which are to be kept in the
+        order in which the first of each ended, and at which of the starts that was. None where it has none."""
         before = self._last.get(octets)
         if before is None and len(self._last) >= KEYS_KEPT:
             return None
@@ -333,9 +337,12 @@ class Cycles:
             kept = self._periods[octets] = deque(maxlen=_PERIODS)
         kept.extend(periods)
 
-    def asked_of(self, unit: int) -> list[bytes]:
-        """What a unit is asked."""
-        return [octets for octets in self._last if octets[:1] == bytes((unit,))]
+    def beside(self, asked: Asked, answer: bytes) -> tuple[Neighbours, ...]:
+        """A request with each other one to its unit that an answer fits, in both orders."""
+        unit = bytes(asked[:1])
+        fitting = [octets for octets in self._last if octets[:1] == unit and is_answer(octets, answer)]
+        others = [(asked[0], self._keys[octets]) for octets in fitting]
+        return tuple(two for one in others for two in ((asked, one), (one, asked)))
 
     def usual(self) -> tuple[int, Key, list[int]] | None:
         """Unit and kind of the request with the most periods, and those in ascending order; None where none repeats."""

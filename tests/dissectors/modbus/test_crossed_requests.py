@@ -63,6 +63,27 @@ def test_a_station_that_answers_about_when_the_master_gives_up_is_no_second_mast
     assert not any(one.code == "MB203" for one in findings_of(bus))
 
 
+def test_one_that_gives_up_too_soon_and_asks_what_always_comes_next_is_no_second_master(bus):
+    for turn in range(12):
+        bus.exchange(PANEL, FEW)
+        if turn % 3:
+            bus.exchange(POLL, VALUES).exchange(TWO, OTHERS)
+        else:  # the answer of station 1 falls on the request to station 2
+            bus.say(POLL).say(TWO, 0).say(VALUES, 3 + turn % 5).say(OTHERS, 9)
+    assert not any(one.code == "MB203" for one in findings_of(bus))
+
+
+def test_late_confirmations_of_what_is_always_asked_before_are_no_requests_of_a_second_master(paper_bus):
+    bus = paper_bus()
+    for turn in range(40):
+        write = f"01060005{turn:04x}"
+        if turn % 8 == 7:  # repeated, and both are answered
+            bus.say(write).say(write, 12).say(write, 5).say(TWO, 7).say(write, 1 + turn % 3).say(TWO, 9).say(OTHERS, 12)
+        else:
+            bus.exchange(write, write, answer=8).exchange(TWO, OTHERS, answer=12)
+    assert not any(one.code == "MB203" for one in findings_of(bus))
+
+
 def test_whoever_is_asked_by_one_that_did_not_wait_speaks_into_nothing(bus):
     """The damage is where two masters met, not where the answer of station 1 was overdue."""
     for _ in range(6):
