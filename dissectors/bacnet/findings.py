@@ -7,17 +7,19 @@ from collections.abc import Iterable
 from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.findings_of_damage import damage, duplicates
-from dissectors.bacnet.findings_of_hearing import TRUSTED, hearing, takes_unheard, unheard_share
+from dissectors.bacnet.findings_of_hearing import hearing, takes_unheard, unheard_share
 from dissectors.bacnet.findings_of_refusals import REFUSED_KEPT, Refusals
 from dissectors.bacnet.findings_of_skipping import skipped
 from dissectors.bacnet.findings_of_tokens import silences, tokens
 from dissectors.bacnet.findings_of_use import polls, use
+from dissectors.bacnet.findings_of_waiting import impatient, waiting
 from dissectors.bacnet.limits import MAX_MASTER, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.ring import COARSE_LIMIT, Ring, RingNode
 from dissectors.bacnet.ring_events import Happened, RingEventKind
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.bacnet.ring_window import MstpRingWindow
 from dissectors.bacnet.rules import RULES
+from dissectors.bacnet.unheard import TRUSTED
 from dissectors.chances import is_rare
 from dissectors.findings import Finding, Severity, as_consequence, counted, times
 from dissectors.frame import Event, Header
@@ -74,6 +76,7 @@ def judge(ring: Ring) -> tuple[Finding, ...]:
         *polls(ring),
         *_answers(ring),
         *_for_others(ring),
+        *waiting(impatient(ring)),
         *hearing(ring),
         *damage(ring),
         *duplicates(ring),

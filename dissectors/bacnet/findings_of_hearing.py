@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
+from dissectors.bacnet.findings_of_waiting import given_up_by, impatient
 from dissectors.bacnet.ring import Ring
-from dissectors.bacnet.ring_events import Happened, RingEvent, RingEventKind
+from dissectors.bacnet.ring_events import HASTY, Happened, RingEvent, RingEventKind
 from dissectors.bacnet.ring_remarks import Remark, listed, of
-from dissectors.bacnet.unheard import HASTY
 from dissectors.findings import Severity, counted, times
 
 UNHEARD_SHARE = 0.01
@@ -22,10 +22,6 @@ HASTY_LEAST = 5
 HASTY_SHARE = 0.8
 """Of what a station sends as after tokens that were not heard: where so much comes too soon after a poll of the one
 that should have passed it, it had one of its own."""
-
-TRUSTED = 4
-"""What happens to a share of the tokens says something of a station where it is so many times the share of frames that
-were not heard."""
 
 
 def hearing(ring: Ring) -> Iterable[Remark]:
@@ -84,19 +80,21 @@ def takes_unheard(ring: Ring, mac: int | None) -> bool:
 
 def _unheard(ring: Ring) -> dict[int, Happened]:
     unheard: dict[int, Happened] = {}
-    second = hasty(ring)
+    second, waits = hasty(ring), impatient(ring)
     for (what, mac), happened in sorted(ring.happened.items(), key=lambda one: one[0][1] or 0):
         counts = what is RingEventKind.UNHEARD or (what is RingEventKind.RETRY and takes_unheard(ring, mac))
         if second and what is RingEventKind.UNHEARD:
-            happened = _without(happened, second)
+            happened = _without(happened, lambda event: event.other in second)
+        if waits and what is RingEventKind.UNHEARD:
+            happened = _without(happened, lambda event: given_up_by(waits, event))
         if counts and happened.count and mac is not None:
             unheard[mac] = unheard.get(mac, Happened()).merge(happened)
     return unheard
 
 
-def _without(happened: Happened, second: Mapping[int, Happened]) -> Happened:
-    """Without what those sent that have a second token."""
-    events = tuple(event for event in happened.events if event.other not in second)
+def _without(happened: Happened, is_otherwise: Callable[[RingEvent], bool]) -> Happened:
+    """Without what was otherwise: sent by those that have a second token, or given up by those that wait too short."""
+    events = tuple(event for event in happened.events if not is_otherwise(event))
     if len(events) == len(happened.events):
         return happened
     return replace(happened, count=len(events), events=events, others=Counter(event.other for event in events))

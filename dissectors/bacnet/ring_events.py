@@ -8,6 +8,9 @@ from enum import Enum
 
 EVENTS_MAX = 32
 
+HASTY = 1
+"""`RingEvent.value` of a token that was passed on sooner than times as they are read allow."""
+
 
 class RingEventKind(Enum):
     """Kinds of events on a ring."""
@@ -38,6 +41,7 @@ class RingEventKind(Enum):
     ILLEGAL = "an address or length that the standard forbids"
     BROADCAST_REQUEST = "a broadcast that asks for a reply"
     UNHEARD = "sent what was not heard here"
+    OVERTAKEN = "went on before its answer came"
     SELF_TOKEN = "passed the token to itself"
 
 
@@ -51,6 +55,11 @@ class RingEvent:
     mac: int | None
     other: int | None = None
     value: int | None = None
+
+    @property
+    def is_wait(self) -> bool:
+        """Whether it is of an answer, and known how long the station that asked waited for it."""
+        return self.value is not None and self.value > HASTY
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,7 +35,8 @@ _NO_ANSWERS = frozenset(
 class AskedInRing:
     """The frame that waits for its answer.
 
-    `missed`: it was counted as one that nobody answered. `answered`: it must have been, though that was not heard.
+    `missed`: it was counted as one that nobody answered. `overtaken`: ns after which who asked went on, so soon that it
+    must have had the answer, though that was not heard; None elsewhere.
     `free`: it asks by its frame type alone, as segments of an answer do; who is asked may answer now, later or not.
     """
 
@@ -45,7 +46,7 @@ class AskedInRing:
     frame: Frame
     no: int
     missed: bool = False
-    answered: bool = False
+    overtaken: int | None = None
     free: bool = False
 
 
@@ -193,13 +194,18 @@ class RingQuestions:
         self._unanswered.move_to_end(key)
         if len(self._unanswered) > _UNANSWERED_MAX:
             self._unanswered.popitem(last=False)
-        if (
-            not self.doubt
-            and not more_follows(asked.frame)
-            and not self._unheard.answered(asked.no, asked.frame, frame)
-        ):
+        if self.doubt or more_follows(asked.frame) or self._is_owed(frame):
+            return
+        if self._unheard.answered(asked.no, asked.frame, frame):
+            asked.overtaken = frame.start - asked.frame.end if frame.octets[4] == asked.source else None
+        else:
             asked.missed = True
             self._tally.note(RingEventKind.NO_REPLY, asked.frame.end, asked.no, asked.destination, asked.source)
+
+    def _is_owed(self, frame: Frame) -> bool:
+        """Whether a frame may be the late answer to another question: it says nothing of the one that waits now."""
+        asked = self._unanswered.get((frame.octets[4], frame.octets[3]))
+        return asked is not None and frame.octets[2] in CARRIES_NPDU and frame.start - asked.frame.end <= T_LATE_ANSWER
 
     def _is_late(self, no: int, frame: Frame, source: int, destination: int) -> bool:
         """Whether it is for the one that asked and has given up: late, but neither lost nor a second token."""
@@ -211,7 +217,9 @@ class RingQuestions:
             return False
         if asked.missed:
             self._tally.take_back(RingEventKind.NO_REPLY, asked.no, source, destination)
-        if not asked.answered and took > T_REPLY_DELAY:  # sooner is in time, however soon the other one went on
+        if asked.overtaken is not None:
+            self._unheard.overtaken(asked.no, asked.frame, asked.overtaken)
+        if took > T_REPLY_DELAY:  # sooner is in time, however soon the other one went on
             self._tally.note(RingEventKind.LATE_REPLY, frame.start, no, source, destination, took)
         return True
 

@@ -233,6 +233,18 @@ _ALL = (
         explains=("MS104", "MS301", "MS401", "MS402", "MS403", "MS406", "LN101", "LN103", "LN2"),
     ),
     Rule(
+        "MS307",
+        Severity.WARNING,
+        "does not wait for answers",
+        "A station that asked went on after the same short wait again and again; three answers and more came behind "
+        "that, or whoever was asked hardly ever answers so soon. Who asks must wait for at least 255 ms "
+        "(Treply_timeout); the answer may take up to 250 ms.",
+        "the timeout for replies is set too short in the station named; the answers come when another may send, and "
+        "run into its frames",
+        "that station's timeout for replies (255 to 300 ms) and its firmware; those who answer are in time",
+        explains=("MS301", "MS401", "MS402", "MS403", "LN101", "LN103", "LN2"),
+    ),
+    Rule(
         "MS401",
         Severity.WARNING,
         "damaged frames",

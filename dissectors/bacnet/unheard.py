@@ -12,7 +12,7 @@ from __future__ import annotations
 from dissectors.bacnet.frame_types import EXPECTING, HEADER, FrameType
 from dissectors.bacnet.limits import MS, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.ring import lies_between
-from dissectors.bacnet.ring_events import RingEventKind
+from dissectors.bacnet.ring_events import HASTY, RingEventKind
 from dissectors.bacnet.ring_tally import RingTally
 from dissectors.frame import Frame
 
@@ -20,11 +20,12 @@ _POLL, _TOKEN = int(FrameType.POLL_FOR_MASTER), int(FrameType.TOKEN)
 _MOST = 8
 """Tokens in a row that may be unheard; so many too where frames came in one read, and have no times of their own."""
 
-HASTY = 1
-"""`RingEvent.value` of a token that was passed on sooner than times as they are read allow."""
-
 T_IMPATIENT = 100 * MS
 """Whoever asked a station that was never heard to answer, and goes on sooner than that, did not give up."""
+
+TRUSTED = 4
+"""What happens to a share of the tokens says something of a station where it is so many times the share of frames that
+were not heard."""
 
 
 class UnheardFrames:
@@ -150,6 +151,7 @@ class UnheardFrames:
         """Whether who asked goes on so soon that it had the answer, which was not heard. Notes it.
 
         It waits for at least 255 ms; of one that does not, the wait is not known. Nor is it in a log without times.
+        `RingEvent.value` is how long it waited, where it is heard to go on itself.
         """
         if not self._tally.timing.has_times:
             return False
@@ -160,8 +162,16 @@ class UnheardFrames:
         longest = gap + asked.slack
         if longest >= limit or (gap >= self._least_gap and longest < self._least + self._least_gap):
             return False
-        self._tally.note(RingEventKind.UNHEARD, asked.end, no, server, client)
+        self._tally.note(
+            RingEventKind.UNHEARD, asked.end, no, server, client, gap if frame.octets[4] == client else None
+        )
         return True
+
+    def overtaken(self, no: int, asked: Frame, waited: int) -> None:
+        """The answer that was supposed to be unheard comes now: who asked went on without it. Notes that instead."""
+        server, client = asked.octets[3], asked.octets[4]
+        self._tally.take_back(RingEventKind.UNHEARD, no, server, client)
+        self._tally.note(RingEventKind.OVERTAKEN, asked.end, no, client, server, waited)
 
     def poll_answered(self, no: int, asked: Frame, frame: Frame) -> bool:
         """Whether the one that was polled is passed the token at once, so that it must have answered. Notes it."""

@@ -138,3 +138,26 @@ def test_proprietary_frames_that_are_answered_are_no_second_token():
     for _ in range(6):
         steps += [*rounds(2, 2, 5, 9), (2, frame(130, 5, 2, b"\x00\x05abc")), (6, frame(131, 2, 5, b"\x00\x05defg"))]
     assert script(steps).findings == ()
+
+
+@pytest.mark.parametrize("latency", [0, 16])
+def test_who_does_not_wait_for_answers_that_are_heard_behind_its_wait(latency: float):
+    steps = rounds(3, 2, 5)
+    for _ in range(3):
+        steps += [(2, ask(2, 9)), (60, token(2, 5)), (9, answer(9, 2)), (9, token(5, 2))]
+    assert script(steps, latency).graves() == {("MS307", "MAC 2")}
+
+
+@pytest.mark.parametrize(("takes", "graves"), [(100, {("MS307", "MAC 2")}), (20, {("MS406", "bus")})])
+def test_who_goes_on_sooner_than_anybody_is_answered_does_not_wait(takes: float, graves: set[tuple[str, str]]):
+    steps = rounds(3, 2, 5)
+    for _ in range(5):
+        steps += [(2, ask(2, 9)), (60, token(2, 5)), (2, ask(5, 9)), (takes, answer(9, 5)), (2, token(5, 2))]
+    assert script(steps).graves() == graves
+
+
+def test_a_late_answer_to_another_says_nothing_of_the_question_that_it_runs_into():
+    steps = rounds(3, 2, 5)
+    for _ in range(3):
+        steps += [(2, ask(2, 9)), (60, token(2, 5)), (2, ask(5, 7)), (9, answer(9, 2)), (9, token(5, 2))]
+    assert script(steps).graves() == {("MS307", "MAC 2")}
