@@ -9,9 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import islice
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings, Timing
+from sniff.engine.session import Session
+from sniff.formats.records import PacketRecord, items_of
 
 LOOKED_AT = 4096
 """Packets from the begin of a file."""
@@ -23,6 +26,13 @@ _FILLED = 1.6  # times as long as its octets take: hardly more than the time to 
 _QUICKEST = 0.1  # of the long packets
 _ROUNDED = 1_000_000  # ns by which a time may be off
 _STRANGE = 0.002  # of all packets: late reads, and clocks that jump
+
+
+def at_shown_rate(session: Session, records: Iterable[PacketRecord]) -> Session:
+    """What is known of a file, with the rate that its packets show where it is slower than the one assumed."""
+    items = (item for record in islice(records, LOOKED_AT) for item in items_of(record, session.protocol))
+    slower = slower_line((item for item in items if isinstance(item, Chunk)), session.line)
+    return session if slower is None else replace(session, line=slower)
 
 
 def slower_line(chunks: Iterable[Chunk], usual: LineSettings) -> LineSettings | None:

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -20,7 +18,7 @@ from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, OWN, USER1, USERS
 from sniff.formats.linktypes import protocol_of as protocol_of_link
 from sniff.formats.network import NETWORK
-from sniff.formats.packet_rate import LOOKED_AT, slower_line
+from sniff.formats.packet_rate import at_shown_rate
 from sniff.formats.records import (
     LONGEST_PACKET,
     PacketRecord,
@@ -81,10 +79,7 @@ class PcapCapture:
             first = next(self._records(stream), None)
         protocol = protocol_of(first) if first is not None else protocol_of_link(self._link_type)
         session = foreign_session(str(path), protocol, first.time if first is not None else 0, "pcap")
-        some = islice(self.records(), LOOKED_AT) if self._link_type in LINK_TYPES else ()
-        items = (item for record in some for item in items_of(record, session.protocol))
-        slower = slower_line((item for item in items if isinstance(item, Chunk)), session.line)
-        self.session: Session = session if slower is None else replace(session, line=slower)
+        self.session: Session = at_shown_rate(session, self.records() if self._link_type in LINK_TYPES else ())
         self._complete = Completeness(True)
 
     def _check(self, header: bytes) -> tuple[str, int]:

@@ -1,6 +1,5 @@
 """pcapng: nanoseconds, comments with our verdict, the CRC-error flag; octets that are no frame on an interface of
 their own. The session travels as a comment of the section, so that our own files come back with their settings.
-
 Read: section header, interface description, enhanced and simple packet blocks and those that came before them, both
 byte orders, any resolution. Other blocks are skipped.
 """
@@ -19,6 +18,7 @@ from sniff.engine.session import NO_TIMES_OF_PACKETS, Completeness, Item, LineEv
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, USER1
 from sniff.formats.network import NETWORK
+from sniff.formats.packet_rate import at_shown_rate
 from sniff.formats.pcapng_interface import OPT_END, OPT_TSRESOL, Interface, interface_of, options
 from sniff.formats.pcapng_packet import (
     CRC_ERROR_FLAG,
@@ -86,7 +86,9 @@ class PcapngCapture:
             self.session: Session = Session.from_metadata(self._metadata)
         else:
             protocol = protocol_of(first) if first is not None else None
-            self.session = foreign_session(str(path), protocol, first.time if first is not None else 0, "pcapng")
+            foreign = foreign_session(str(path), protocol, first.time if first is not None else 0, "pcapng")
+            self.session = foreign if self._is_timeless else at_shown_rate(foreign, self.records())
+            self._metadata = {}  # what a later section says is told when it comes
         if self._is_timeless:
             unknown = replace(self.session.adapter, latency=IN_PACKETS, latency_from=NO_TIMES_OF_PACKETS)
             self.session = replace(self.session, adapter=unknown)

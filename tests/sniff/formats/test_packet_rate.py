@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import pytest
 
 from dissectors.frame import Chunk
 from dissectors.line import MS, LineSettings, Timing
+from sniff.formats import read
 from sniff.formats.packet_rate import slower_line
+from tests.sniff.formats.packets_made import Packet, as_pcap, as_pcapng
+
+MSTP = 165
+"""Link type."""
 
 USUAL = LineSettings.parse("38400,8N1")
 
@@ -28,6 +35,14 @@ def chunks(baud: int, seed: int = 0, *, least: float = 2, most: float = 30, long
 @pytest.mark.parametrize("baud", [9600, 19200])
 def test_the_rate_of_a_slow_bus(baud: int, seed: int) -> None:
     assert slower_line(chunks(baud, seed), USUAL) == LineSettings.parse(f"{baud},8N1")
+
+
+@pytest.mark.parametrize("write", [as_pcap, as_pcapng])
+def test_a_packet_file_of_another_program_is_read_at_that_rate(
+    write: Callable[[Path, Sequence[Packet], int], Path], tmp_path: Path
+) -> None:
+    capture = read(write(tmp_path / "slow", [(one.time, one.octets) for one in chunks(9600)], MSTP))
+    assert (capture.session.line, capture.session.line_is_assumed) == (LineSettings.parse("9600,8N1"), True)
 
 
 @pytest.mark.parametrize(
