@@ -39,7 +39,9 @@ def skipped(ring: Ring) -> Iterable[Remark]:
 
 
 def _shut_out(ring: Ring, mac: int, node: RingNode, by: int, following: int, rounds: int) -> Remark:
-    polled = sorted(address for source, address in ring.polled if source == by)
+    polled = sorted(
+        address for (source, address), time in ring.polled.items() if source == by and time > node.last_token
+    )
     first = "" if ring.first is None else f" {(node.last_token - ring.first) / 1e9:.2f} s into the capture"
     seen = (
         f"got its last token{first}; since then {rounds} rounds without a token or a poll for it: "

@@ -66,6 +66,7 @@ class BulkBusWatch(BusWatch):
         self._heard, self._slack = int(frames.end[last]), int(rows.slack[last])
         silent = request[units.poll[which] & ~units.answered[which]]
         self._wasted += int(np.clip(frames.start[silent + 1] - frames.end[silent], 0, self._slot).sum())
+        self._gone.difference_update(np.unique(units.source[which]).tolist())
         self._count(units, which)
         self._pass_tokens(rows, units, which)
         self._exchange(rows, units, which)

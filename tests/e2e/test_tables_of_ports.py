@@ -81,7 +81,8 @@ def test_a_table_is_drawn_into_its_room(capsys: pytest.CaptureFixture[str], monk
 
     monkeypatch.setenv("LINES", "10")
     monkeypatch.setenv("COLUMNS", "80")
-    live = SimpleNamespace(session=SESSION, searching=None, model=SimpleNamespace(summary=Summary(SESSION.line)))
+    model = SimpleNamespace(summary=Summary(SESSION.line))
+    live = SimpleNamespace(session=SESSION, searching=None, model=model, now=None)
     watching._draw(live, lambda: print("\n".join(map(str, range(50)))))  # type: ignore[arg-type]
     lines = capsys.readouterr().out.split("\n")
     assert "Ctrl-C ends" in lines[0]

@@ -50,6 +50,7 @@ _two = Member(2, partial(controller, 5))
 _five = Member(5, partial(drive, 5))
 _nine = Member(9, partial(drive, 9))
 _four = (_one, _two, _five, _nine)
+_off_for_a_second = partial(FailsFor, at=8 * S, until=9 * S, faults=Faults(off=True))
 
 _LAST = r"\blast\b|too early|too soon|\bends?\b.*missing|lets go|cut (off|short)"
 _SLOW = r"slow|late|after the token was (passed|repeated)|took"
@@ -189,6 +190,21 @@ MSTP_CASES: tuple[Case, ...] = (
             )
         ),
         (Said(("MAC 9", "MAC 5", "5 → 9"), words=_OUT),),
+        also=("MS106", "MS101"),
+        seconds=40,
+        seeds=1,
+    ),
+    Case(
+        "MS/TP several stations shut out",
+        Ring(
+            (
+                _one,
+                _with(_two, change=partial(PollsOnlyTo, at=5 * S, max_master=1)),
+                _with(_five, change=_off_for_a_second),
+                _with(_nine, change=_off_for_a_second),
+            )
+        ),
+        (("MS112", "MAC 2"),),
         also=("MS106", "MS101"),
         seconds=40,
         seeds=1,

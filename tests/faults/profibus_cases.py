@@ -19,7 +19,7 @@ from sniff.simulation.tap import FTDI
 from sniff.simulation.wire import Party
 from tests.faults.buses import MS, Change
 from tests.faults.case import Case, Said
-from tests.faults.profibus_stations import Off, from_the_middle
+from tests.faults.profibus_stations import KeepsToken, Off, from_the_middle
 from tests.faults.stations import Dies, Wrapped
 
 LINE = LineSettings.parse("187500,8E1")
@@ -304,6 +304,14 @@ PROFIBUS_CASES: tuple[Case, ...] = (
         partial(profibus, change={"second master": Dozes}),
         (("PB014", "station 2"),),
         never=("PB013", "PB015"),
+        seeds=1,
+    ),
+    Case(
+        "PROFIBUS master keeps the token",
+        partial(profibus, change={"controller": partial(KeepsToken, at=5 * S)}),
+        (("PB021", "station 1"),),
+        never=("PB013", "PB015"),
+        seconds=10,
         seeds=1,
     ),
     Case(

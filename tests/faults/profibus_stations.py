@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from dissectors.frame import Chunk
 from dissectors.profibus.simulated_master import Job
-from dissectors.profibus.telegram import telegram
+from dissectors.profibus.telegram import parse, telegram, token
 from dissectors.simulated import Send, Station
 from sniff.engine.session import Item
 from sniff.simulation.scenarios import Scenario, simulate
@@ -72,6 +72,22 @@ class Off(Wrapped):
     def next_wake(self) -> int | None:
         due = super().next_wake()
         return None if due is None or due >= self.at else due
+
+
+class KeepsToken(Wrapped):
+    """A master that passes its token to nobody from a time on, and asks on."""
+
+    def __init__(self, inner: Station, at: int) -> None:
+        super().__init__(inner)
+        self.at = at
+
+    def wake(self, now: int) -> tuple[Send, ...]:
+        sends = super().wake(now)
+        passed = parse(sends[0].octets) if sends and now >= self.at else None
+        if passed is None or not passed.is_token or passed.source is None:
+            return sends
+        self.inner.hear(now, token(passed.source, passed.source), True)
+        return ()
 
 
 def from_the_middle(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
