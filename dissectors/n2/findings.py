@@ -109,6 +109,8 @@ class N2Findings:
         elif event.damage is not Damage.RESTARTED or event.repair is not None:
             counts = self._add_bad("master", self.master, no, event)
             gave_up = last is not None and event.start - last.frame.end >= HASTE
+            if counts and last is not None and event.repair is None:
+                self.masters.see_damaged(last, no, event)
             if counts and gave_up and before in self.stations and event.repair is None:
                 self.stations[before].behind.add(event.start, no)
 
@@ -220,7 +222,9 @@ class N2Findings:
             self.obeyed(station, asked, transaction)
 
     def unanswered(self, station: int, start: int, end: int, after: int) -> None:
-        """A command that nothing followed until `after`; ns."""
+        """A command that nothing followed until `after`; ns. Who did not wait for it cannot have been spoken into."""
+        if after - end < HASTE:
+            return
         self.late_speakers.unanswered(station, Due(), start, end, after - end)
 
     def _see_hit(self, transaction: Transaction) -> None:
@@ -231,7 +235,7 @@ class N2Findings:
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far: the bus first, then station by station."""
         span = self.now - (self.first or 0)
-        masters, clocked = self.masters.seen, self.clocked.rhythm.is_by_the_clock
+        masters, clocked = self.masters, self.clocked.rhythm.is_by_the_clock
         heard = N2Evidence(self.now, span, self.master, self.stations, masters, self._stray, self.strikes, clocked)
         found = (reaching(one, self.late_speakers) if one.code == "N2011" else one for one in worded(heard))
         return (*found, *of_late_speakers(heard, self.late_speakers))

@@ -6,6 +6,7 @@ only this counts:
 - a command that begins in the middle of another one, without the silence of a master that gave up
 - a command that follows another one sooner than the station asked ever answered, and than any master gives up
 - an answer that came in its usual time, and yet after the next command
+- damaged commands, far more often than elsewhere, where the answer to the one before is due: two spoke at once
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ HASTE: Final = 100_000_000
 KNOWN: Final = 8
 """Answers of a station after which its shortest time says something."""
 
+_BEGIN = 3  # octets of a command: start and address
 _SAME = 6  # octets of two commands: start, address, command and what it asks
 
 
@@ -40,10 +42,12 @@ class OpenCommand:
 
 @dataclass(slots=True)
 class Masters:
-    """Fed the commands; `seen` counts what one master would not do. `char`: ns that a character takes."""
+    """Fed the commands; `seen` counts what one master would not do, `damaged` damaged commands to others that came
+    before a master gives up. `char`: ns that a character takes."""
 
     char: int
     seen: Tally = field(default_factory=Tally)
+    damaged: Tally = field(default_factory=Tally)
     _last: OpenCommand | None = None  # the newest command, while nothing has come after it
 
     def see_other(self) -> None:
@@ -72,6 +76,13 @@ class Masters:
             return
         if longest < station.quickest:
             self.seen.add(asked.frame.start, last.row, asked.row)
+
+    def see_damaged(self, last: OpenCommand, no: int, frame: Frame) -> None:
+        """Take a damaged command, and the one before it, that nothing has come after."""
+        is_at_once = frame.start - (last.frame.end - last.frame.slack) < HASTE
+        is_echo = last.frame.octets[:_BEGIN] == frame.octets[:_BEGIN]
+        if is_at_once and not is_echo and last.frame.ok and last.command.address != BROADCAST:
+            self.damaged.add(frame.start, last.row, no)
 
     def see_late(self, transaction: Transaction, station: N2StationRecord) -> None:
         """Take an answer that came after the next command: directly behind that one, else the master had something that

@@ -79,7 +79,8 @@ RULES: dict[str, Rule] = {
             "two masters",
             "Commands that begin in the middle of another one, or follow one within 100 ms and sooner than the station "
             "asked ever answered; answers in their usual time, within 100 ms, and yet after the next command. No "
-            "master does that. At least two such.",
+            "master does that. At least two such; or at least three damaged commands within 100 ms behind one that "
+            "nothing followed, far more than of all commands (chance under 1 in 500).",
             "two masters on one bus, or a commissioning tool beside the controller",
             "find the second master and take it off",
             explains=("N2004", "N2005", "N2008", "N2010", "N2011", "N2013", "N2014", "N2015", "N2016", "LN1", "LN2"),

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from dissectors.chances import is_rare
+from dissectors.chances import at_least, is_rare
 from dissectors.findings import Finding, Severity, Tally, counted, times, together
 from dissectors.frame import Flaw
 from dissectors.line import MS, NS_PER_S
 from dissectors.n2.blame import blamed
 from dissectors.n2.commands import error_name
+from dissectors.n2.masters import HASTE, Masters
 from dissectors.n2.objects import REGIONS, attribute_name, number, object_name
 from dissectors.n2.record import Damages, N2StationRecord
 from dissectors.n2.rules import RULES
 from dissectors.n2.unheard import SOON
 from dissectors.strikes import Strikes
+from dissectors.words import duration
 
 SLOW = SOON
 """Answers after which an NAE with the shortest timeout would have given up, ns."""
@@ -32,6 +34,9 @@ ALIKE_OFF = 6
 TRIES = 11
 """Most commands of one turn to a station: a first one and the most retries that an NAE can be given (3 to 10)."""
 
+_INTO_ANSWERS = 3
+_SELDOM = 0.002
+
 SCAN = 8
 """So many addresses that are only asked who they are, and are not there, are a scan."""
 
@@ -44,10 +49,20 @@ class N2Evidence:
     span: int
     master: Damages
     stations: Mapping[int, N2StationRecord]
-    masters: Tally
+    masters: Masters
     stray: Tally
     strikes: Strikes
     clocked: bool  # the master sends by a clock: that it goes on says nothing of an answer
+
+    @property
+    def speaks_into_answers(self) -> bool:
+        """Whether so many damaged commands stand where an answer is due as chance does not explain."""
+        struck, silent = self.masters.damaged.count, 0
+        for one in self.stations.values():
+            silent += one.missing.tally().count + one.unheard.tally().count + one.late.count
+        if self.clocked or struck < _INTO_ANSWERS or silent >= self.master.frames:
+            return False
+        return at_least(struck, self.master.bad.count, silent / self.master.frames) < _SELDOM
 
     def missing(self, station: N2StationRecord) -> Tally:
         """Commands to it that no answer followed, as far as is known."""
@@ -69,10 +84,15 @@ class N2Evidence:
 
 def worded(heard: N2Evidence) -> Iterator[Finding]:
     """All findings: the bus first, then station by station."""
-    if heard.masters.count >= 2:
-        seen = f"{heard.masters.count} times what one master would not do: a command in the middle of another one, "
+    masters = heard.masters
+    if masters.seen.count >= 2:
+        seen = f"{masters.seen.count} times what one master would not do: a command in the middle of another one, "
         seen += "or before its answer can have come"
-        yield heard.masters.found(RULES["N2007"], "bus", seen)
+        yield masters.seen.found(RULES["N2007"], "bus", seen)
+    elif heard.speaks_into_answers:
+        seen = f"{masters.damaged.count} of {counted(heard.master.bad.count, 'damaged command')} came while the answer "
+        seen += f"to the one before was due, sooner than a master gives up ({duration(HASTE)})"
+        yield masters.damaged.found(RULES["N2007"], "bus", seen)
     if heard.stray.count:
         seen = f"{counted(heard.stray.count, 'answer')} came unasked"
         finding = heard.stray.found(RULES["N2011"], "bus", seen)

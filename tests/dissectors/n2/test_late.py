@@ -36,6 +36,23 @@ def test_commands_damaged_behind_one_to_it_show_who_is_late(late: list[list[byte
     assert (("N2014", "station 2") in told(turns)) is is_told
 
 
+def test_commands_damaged_where_an_answer_is_due_are_those_of_two_masters() -> None:
+    """No master has given up 20 ms behind its command, so who was asked is not late."""
+    turns = [asked(2)]
+    for no in range(8):
+        turns += [asked(1), asked(3), asked(1), asked(3), [*asked(2)[:1], SPOILT], asked(3)[: 1 + no % 2]]
+    assert {one for one in told(turns) if one[0] in ("N2007", "N2014")} == {("N2007", "bus")}
+
+
+def test_commands_damaged_anywhere_are_not_those_of_two_masters() -> None:
+    """Three are behind one whose answer was not heard here, and as many where answers were."""
+    turns = [asked(2)]
+    for _ in range(3):
+        turns += [asked(1), asked(3), [*asked(2)[:1], SPOILT], asked(1), [SPOILT], asked(1), [SPOILT], asked(2)]
+        turns += [asked(3), *([asked(2)[:1]] * 2), asked(1), [SPOILT]]
+    assert ("N2007", "bus") not in told(turns, 60)
+
+
 @pytest.mark.parametrize(("wait", "is_told"), [(60, True), (400, False)])
 def test_a_master_that_asks_for_the_next_point_soon_had_its_answer(wait: int, is_told: bool) -> None:
     """Several points of one station in a row: the next one is no repeat."""
