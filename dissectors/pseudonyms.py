@@ -35,10 +35,6 @@ class Pseudonyms:
         gets one from the end, so that the first ones are left for those that are sure."""
         return self._named(number, is_sure=False)
 
-    def if_known(self, number: int) -> int:
-        """The pseudonym of a number that has one; else itself: a number out of a damaged frame may be nobody's."""
-        return self._known.get(number, number)
-
     def _named(self, number: int, *, is_sure: bool) -> int:
         if number not in self._known:
             both = next((ends for numbers, *ends in self._classes if number in numbers), None)

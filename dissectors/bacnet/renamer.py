@@ -48,9 +48,9 @@ class MstpRenamer:
 
     def _renamed(self, octets: bytes, *, intact: bool) -> bytes:
         if len(octets) < 8:
-            return octets
+            return octets[:3] + bytes(map(self.stations.of_doubtful, octets[3:5])) + octets[5:]
         good = crc8_mstp(octets[2:7]) == octets[7]
-        address = self.stations.of if good else self.stations.if_known
+        address = self.stations.of if good else self.stations.of_doubtful
         header = bytes([octets[2], address(octets[3]), address(octets[4]), octets[5], octets[6]])
         check = octets[7] ^ crc8_mstp(octets[2:7]) ^ crc8_mstp(header)  # linear: the error in it stays what it was
         head = octets[:2] + header + bytes([check])

@@ -29,11 +29,13 @@ class ProfibusRenamer:
     def _renamed(self, octets: bytes, sure: bool) -> bytes:
         """`sure`: every address in it is somebody's. The sum is moved by as much as the addresses are."""
         at, renamed = 4 if octets[0] == SD2 else 1, bytearray(octets)
-        if octets[0] == SC or len(octets) < at + 2:
+        if octets[0] == SC:
             return octets
-        name = self.stations.of if sure else self.stations.if_known
-        for place in (at, at + 1):
+        name = self.stations.of if sure else self.stations.of_doubtful
+        for place in range(at, min(at + 2, len(octets))):
             renamed[place] = renamed[place] & 0x80 | name(renamed[place] & 0x7F)
+        if len(octets) < at + 2:
+            return bytes(renamed)
         telegram = parse(octets)
         told = _address_in(telegram)
         if told is not None:

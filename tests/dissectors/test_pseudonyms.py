@@ -8,7 +8,6 @@ from dissectors.pseudonyms import Pseudonyms
 def test_each_class_gives_its_own_numbers_in_the_order_of_appearance() -> None:
     names = Pseudonyms(range(1, 4), range(4, 6), kept=(0, 2))
     assert [names.of(number) for number in (3, 5, 3, 0, 2, 1, 4)] == [1, 4, 1, 0, 2, 3, 5]
-    assert (names.if_known(3), names.if_known(77)) == (1, 77)
 
 
 def test_a_number_of_no_class_stays_as_it_is() -> None:

@@ -50,14 +50,20 @@ def test_check_octets_that_are_alike_are_wrong_all_the_same() -> None:
     assert made[2:] != b"\x05\x05"
 
 
-def test_the_error_of_a_header_check_stays_and_unheard_addresses_keep_their_number() -> None:
+def test_the_error_of_a_header_check_stays_and_unheard_addresses_get_a_number_from_the_end() -> None:
     rename = MstpRenamer()
     header = bytes([0, 9, 17, 0, 0])
     rename.stations.of(5)
     new = rename.stations.of(9)
     renamed = rename(_frame(b"\x55\xff" + header + bytes([crc8_mstp(header) ^ 0x21]), Check.BAD, Damage.HEADER))
-    assert (renamed[3], renamed[4]) == (new, 17)
+    assert (renamed[3], renamed[4]) == (new, 127)
     assert renamed[7] ^ crc8_mstp(renamed[2:7]) == 0x21
+
+
+@pytest.mark.parametrize("size", range(8))
+def test_a_header_that_is_cut_gives_no_address_away(size: int) -> None:
+    cut = bytes.fromhex("55ff0009110000")[:size]
+    assert MstpRenamer()(_frame(cut, Check.ABSENT, Damage.SHORT)) == bytes.fromhex("55ff007f7e0000")[:size]
 
 
 def test_the_error_of_a_modbus_crc_stays() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dissectors.frame import Check, FoundBy, Frame
+from dissectors.frame import Check, Damage, FoundBy, Frame
 from dissectors.profibus.diagnosis import parse_diagnosis
 from dissectors.profibus.envelope import is_sound
 from dissectors.profibus.parameters import parse_new_address
@@ -30,6 +30,15 @@ def test_the_master_that_a_diagnosis_names_is_the_one_that_asks(master: int) -> 
     assert (answer.source, answer.destination) == (asked.destination, asked.source) == (1, 2)
     assert told.master == {40: asked.source, 77: 3, 255: 255}[master]
     assert told.ident == 0xF510
+
+
+@pytest.mark.parametrize("size", range(1, 12))
+def test_a_damaged_telegram_gives_no_address_away(size: int) -> None:
+    octets = telegram(60, 40, 0x6D, bytes(2))
+    spoilt = (octets[:-2] + bytes((octets[-2] ^ 4, octets[-1])))[:size]
+    found = ProfibusRenamer()(Frame("profibus", spoilt, 0, 0, Check.BAD, FoundBy.DELIMITER, Damage.CHECK))
+    assert found[:8] == (octets[:4] + bytes((126, 125)) + octets[6:8])[:size]
+    assert len(found) == len(spoilt)
 
 
 def test_an_address_that_is_given_is_renumbered() -> None:
