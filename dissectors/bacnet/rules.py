@@ -242,7 +242,7 @@ _ALL = (
         "the timeout for replies is set too short in the station named; the answers come when another may send, and "
         "run into its frames",
         "that station's timeout for replies (255 to 300 ms) and its firmware; those who answer are in time",
-        explains=("MS301", "MS401", "MS402", "MS403", "LN101", "LN103", "LN2"),
+        explains=("MS101", "MS301", "MS401", "MS402", "MS403", "LN101", "LN103", "LN2"),
     ),
     Rule(
         "MS401",

@@ -22,6 +22,7 @@ from tests.faults.ring_nodes import (
     AnswersTests,
     Dawdles,
     FailsFor,
+    GivesUpSoon,
     Greedy,
     PollsOnlyTo,
     SpeaksUnasked,
@@ -193,6 +194,21 @@ MSTP_CASES: tuple[Case, ...] = (
         also=("MS106", "MS101"),
         seconds=40,
         seeds=1,
+    ),
+    Case(
+        "MS/TP master does not wait for answers",
+        Ring(
+            (
+                _with(_one, change=partial(GivesUpSoon, after=60 * MS)),
+                _two,
+                _with(_five, settings={"faults": {"reply_delay": 90 * MS}}),
+                _nine,
+            )
+        ),
+        (("MS307", "MAC 1"),),
+        also=("MS101",),  # its answers run into tokens
+        struck=("MAC 5", "MAC 9", "1 → 5"),
+        seconds=30,
     ),
     Case(
         "MS/TP several stations shut out",

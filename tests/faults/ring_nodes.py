@@ -184,6 +184,26 @@ class PollsOnlyTo(Wrapped):
         return super().hear(now, octets, quiet)
 
 
+class GivesUpSoon(Wrapped):
+    """A node that waits for answers for no longer than `after` ns."""
+
+    def __init__(self, inner: SimulatedNode, after: int) -> None:
+        super().__init__(inner)
+        self.node, self.after = inner, after
+
+    def wake(self, now: int) -> tuple[Send, ...]:
+        if (due := self._due()) is not None and now >= due:
+            self.node._wake_at = now
+        return super().wake(now)
+
+    def next_wake(self) -> int | None:
+        wake, due = super().next_wake(), self._due()
+        return wake if due is None or wake is None else min(wake, due)
+
+    def _due(self) -> int | None:
+        return self.node._busy_until + self.after if self.node._state.name == "ASKING" else None
+
+
 class Dawdles(Wrapped):
     """A node that takes `by` ns for one token every `every` ns. A token that comes meanwhile it uses as well."""
 
