@@ -350,7 +350,7 @@ class TimePatterns:
         steady = sum(abs(interval - usual) <= STEADY * usual for interval in intervals)
         known = Counter(name for burst in bursts for name in burst.senders if name != "bus")
         struck = sorted(known.values(), reverse=True)
-        elsewhere = struck[1] if len(struck) > 1 else sum("bus" in burst.senders for burst in bursts)
+        elsewhere = struck[1] if len(struck) > 1 else 0  # noise beside the only one that is struck may be its remains
         between = sorted(burst.good_before for burst in bursts[1:])[len(intervals) // 2]
         if usual < NS_PER_S or steady < 0.75 * len(intervals) or between < 10:
             return None

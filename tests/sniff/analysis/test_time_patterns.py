@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from dissectors.frame import Check, Damage, FoundBy, Frame
+from dissectors.frame import Check, Damage, Event, FoundBy, Frame, Noise, Place, Reason
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.simulated import Cells, ModbusServer
 from dissectors.modbus.simulated_master import PollingMaster, read_holding
@@ -144,6 +144,24 @@ def test_one_stations_own_rhythm_is_no_hum() -> None:
         frame = Frame("x", octets, start + no % 2 * 3 * MS, start + 5 * MS, check, FoundBy.GAP, damage)
         told.see(no, frame, "station 6" if no % 2 else "master")
     assert list(told.findings()) == []
+
+
+@pytest.mark.parametrize("others", [0, 1])
+def test_noise_beside_the_only_one_that_is_struck_is_its_own(others: int) -> None:
+    """Station 6 answers at an interval, and leaves an octet that is no frame; then the master, too, is struck."""
+    told = TimePatterns(Session("x", LineSettings.parse("38400,8N1"), "modbus-rtu"))
+    rows: list[tuple[Event, str]] = []
+    for no in range(20 * 12):
+        start, is_bad, octets = no * 200 * MS, no % 20 < 2 + others, bytes((3, no, 0, 0, 0, 0, 0, 0))
+        damage, check = (Damage.CHECK, Check.BAD) if is_bad else (None, Check.GOOD)
+        sender = "station 6" if no % 20 < 2 else "master"
+        rows.append((Frame("x", octets, start, start + 5 * MS, check, FoundBy.GAP, damage), sender))
+        if is_bad:
+            rest = Noise(b"\r", start + 20 * MS, start + 21 * MS, Place.BETWEEN, Reason.NO_FRAME)
+            rows.append((rest, "bus"))
+    for no, (event, sender) in enumerate(rows, 1):
+        told.see(no, event, sender)
+    assert [one.code for one in told.findings()] == ["LN302"] * others
 
 
 def test_a_contactor_shows_among_single_errors() -> None:
