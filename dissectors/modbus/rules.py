@@ -89,8 +89,9 @@ _ALL = (
         Severity.ERROR,
         "answered twice",
         "A second answer from the same address directly after the first, to a request that was sent once. A single one "
-        "is only noted, and so are no more than the station's late answers. An error only where the two ever differ: "
-        "the same octets again may also come from one device or a converter that sends twice.",
+        "is only noted, and so are no more than the station's late answers, or, fewer than 1 in 10 of its answers, no "
+        "more than it gave late or not at all. An error only where the two ever differ: the same octets again may also "
+        "come from one device or a converter that sends twice.",
         "two stations have the same address, the second one slower",
         "switch the station off and see whether something still answers; give one another address",
         explains=(*_OF_COLLISIONS, "MB301", "MB401"),

@@ -40,6 +40,7 @@ _NEARLY_ALL_LEAST = 10  # damaged answers
 _GARBLED_LEAST = 5  # damaged answers that are no frame at all
 _TEXT_SHOWN = 24
 _SYSTEM_LEAST = 3  # of one kind, before it is a system
+_SECOND_RARE = 10  # answers for each second one, where these are rare
 _EXCESS_SPREAD = 2  # octets
 _HEX_SHOWN = 16
 _REPEATS_COST = 0.02
@@ -65,8 +66,7 @@ def of_station(
     yield from _times(name, station, timeout, seen, is_common)
     if station.twice.count:
         words = f"a second answer came to {counted(station.twice.count, 'request')}"
-        slow = station.twice.count <= station.late.count  # two tries, two answers: the first one came late
-        yield _twice(name, station, words, slow)
+        yield _twice(name, station, words, _may_be_late(station))
     if station.undecided.count:
         words = f"{counted(station.undecided.count, 'frame')} may be the answer or the request again"
         yield station.undecided.found(RULES["MB403"], name, words)
@@ -172,6 +172,13 @@ def _damaged(seen: BusRecord, name: str, station: StationRecord, is_common: bool
         following = f"baud rate, parity and protocol in the device's settings; {finding.next}"
         finding = replace(finding, means=means, next=following)
     yield finding
+
+
+def _may_be_late(station: StationRecord) -> bool:
+    """Whether second answers may all be to tries before: no more than came late, or, where they are rare, than came
+    late or were left. Two stations answer nearly each time."""
+    twice, late, left = station.twice.count, station.late.count, station.missing.count
+    return twice <= late or (twice <= late + left and _SECOND_RARE * twice <= station.answered)
 
 
 def _is_nothing_of_this_line(station: StationRecord) -> bool:

@@ -318,3 +318,17 @@ def test_damage_that_seems_to_ask_a_station_nobody_knows_is_a_damaged_answer(bus
         bus.say(READ, 200).damage("300100010100", at=5)
     assert graves_of(bus) == {("MB014", "station 1")}
     assert not [one for one in findings_of(bus) if one.code in ("MB001", "MB009")]
+
+
+@pytest.mark.parametrize(("left", "severity"), [(0, Severity.ERROR), (1, Severity.ERROR), (3, Severity.NOTE)])
+def test_few_second_answers_of_who_leaves_more_may_be_to_tries_before(paper_bus, left, severity):
+    one, values, others = "010300000002", "01030400010002", "01030400010003"
+    bus = paper_bus()
+    for _ in range(30):
+        bus.exchange(one, values).exchange("020300000002", "02030400030004")
+    for _ in range(2):
+        bus.exchange(one, values).say(others, 2).exchange("020300000002", "02030400030004", pause=60)
+    for _ in range(left):
+        bus.say(one).exchange("020300000002", "02030400030004", pause=400)
+    (finding,) = (one for one in findings_of(bus) if one.code == "MB201")
+    assert finding.severity is severity
