@@ -52,7 +52,7 @@ def _pcapng(kind: int, kept: int = 0, order: str = "<") -> bytes:
         if kind == SIMPLE:
             head = struct.pack(order + "I", len(octets))
         elif kind == OBSOLETE:
-            head = struct.pack(order + "HHI", 0, 3, time >> 32) + head
+            head = struct.pack(order + "HHI", 0, 0, time >> 32) + head
         else:
             head = struct.pack(order + "II", 0, time >> 32) + head
         written += _block(order, kind, head + held)
