@@ -163,7 +163,7 @@ def _bacnet_place(table: CheckedTable) -> tuple[str, int]:
 def _any_place(table: CheckedTable) -> tuple[str, int]:
     """A place as the readings of a plug-in have it: their space, and the address in it."""
     space, _, number = table.text("object").rpartition(" ")
-    if not space or not number.isdigit():
+    if not space or not _is_number(number, 999_999_999):
         raise table.error("object", 'expected "counter 7": what the plug-in calls the kind of thing, and its number')
     return space, int(number)
 

@@ -99,7 +99,11 @@ def test_objects_of_a_plug_in_stand_under_its_name() -> None:
     assert (entry.name, entry.unit, entry.scale, entry.number) == ("level", "m", 0.1, "place 7")
     assert bell.limits_on("gong").frame == 13
     assert bell.exception("gong", 3) == "cracked"
-    for wrong in (GONG.replace("[[gong", "[[going"), GONG.replace("place 7", "place"), GONG + "colour = 3\n"):
+    for wrong in (
+        GONG.replace("[[gong", "[[going"),
+        *(GONG.replace("place 7", place) for place in ("place", "place ²", "place " + "9" * 5000)),
+        GONG + "colour = 3\n",
+    ):
         with pytest.raises(ProfileError):
             parse_text(wrong, "x")
 
