@@ -7,6 +7,9 @@ from math import erfc, exp, lgamma, log, log1p, sqrt
 _EXACT_MOST = 400
 _NEGLIGIBLE = 1e-12
 
+SELDOM, SELDOM_ALONE = 0.01, 0.05
+"""Chance below which it is none that any sender has so much of all damage; that any has all of it."""
+
 MINUTE = 60_000_000_000  # ns
 TOLERABLE = 2
 """Disturbances a minute that Johnson Controls calls tolerable."""
@@ -35,6 +38,12 @@ def at_least(count: int, of: int, share: float) -> float:
         if k > of * share and term <= total * _NEGLIGIBLE:  # from there on each is less than the one before
             break
     return min(1.0, total)
+
+
+def is_by_chance(count: int, of: int, share: float, senders: int) -> bool:
+    """Whether what falls anywhere strikes one of so many senders as often as that, now and then: of many one is always
+    struck most. `share`: 0 … 1, of what all of them sent. Where nobody else is struck, that speaks for itself."""
+    return senders * at_least(count, of, share) >= (SELDOM_ALONE if count == of else SELDOM)
 
 
 def is_rare(count: int, of: int, span: int) -> bool:

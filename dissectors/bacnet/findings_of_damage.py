@@ -11,7 +11,7 @@ from dissectors.bacnet.ring import Ring, RingNode
 from dissectors.bacnet.ring_events import Happened, RingEventKind
 from dissectors.bacnet.ring_remarks import Remark, listed, of, plain, subject
 from dissectors.bacnet.rules import RULES
-from dissectors.chances import at_least, is_rare
+from dissectors.chances import is_by_chance, is_rare
 from dissectors.findings import Severity, counted, times
 from dissectors.wrong_checks import Habit
 
@@ -22,9 +22,6 @@ NOISE_LEAST = 20
 NOISE_SHARE = 0.005
 LIKE_ALL = 3
 """A station is named for damage where it has so many times what its share of the octets would bring."""
-
-SELDOM, SELDOM_ALONE = 0.01, 0.05
-"""Chance below which it is no chance that any station has so much of the damage; that any has all of it."""
 
 AT_END_SHARE = 0.8
 """Share of a station's damaged frames that lack their end alone, from which on that is its driver."""
@@ -73,8 +70,7 @@ def _is_chance(ring: Ring, node: RingNode) -> bool:
     octets = {id(one): one.octets + one.damaged_octets for one in ring.nodes.values()}
     damaged = sum(one.damaged for one in ring.nodes.values())
     share = octets[id(node)] / max(1, sum(octets.values()))
-    chance = at_least(node.damaged, damaged, share) * sum(count > 0 for count in octets.values())
-    return share < 1 and chance >= (SELDOM_ALONE if damaged == node.damaged else SELDOM)
+    return share < 1 and is_by_chance(node.damaged, damaged, share, sum(count > 0 for count in octets.values()))
 
 
 def _of_one(ring: Ring, mac: int, node: RingNode) -> Iterable[Remark]:

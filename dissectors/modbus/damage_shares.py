@@ -12,11 +12,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from dissectors.chances import at_least
+from dissectors.chances import at_least, is_by_chance
 from dissectors.modbus.bus_record import BusRecord
-
-_SELDOM = 0.01  # that any of all senders is struck so often by what falls anywhere
-_SELDOM_ALONE = 0.05  # the same where nobody else has any damage, which speaks for itself
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +45,7 @@ def shares_of_damage(seen: BusRecord) -> DamageShare:
     hits["master"] = requests
     if requests and "master" not in blamed:
         share = octets["master"] / sum(octets.values())
-        alone = not any(count for sender, count in hits.items() if sender != "master")
-        if _any_of(octets, octets) * at_least(requests, sum(hits.values()), share) < (
-            _SELDOM_ALONE if alone else _SELDOM
-        ):
+        if not is_by_chance(requests, sum(hits.values()), share, _any_of(octets, octets)):
             blamed.add("master")
     common = {sender: count for sender, count in frames.items() if count > 0 and sender not in blamed}
     return DamageShare(frozenset(blamed), common)
@@ -68,7 +62,7 @@ def to_blame(hits: dict[str, int], octets: dict[str, int]) -> set[str]:
         if not chances:
             break
         worst = min(chances, key=lambda sender: chances[sender])
-        if _any_of(left, octets) * chances[worst] >= (_SELDOM_ALONE if len(chances) == 1 else _SELDOM):
+        if is_by_chance(left[worst], damaged, octets[worst] / sent, _any_of(left, octets)):
             break
         blamed.add(worst)
         del left[worst]

@@ -7,16 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from dissectors.chances import at_least
+from dissectors.chances import is_by_chance
 from dissectors.frame import Frame, Role
 from dissectors.tracker import Placement
 
 ONE_STATION: Final = 0.9
 """The part of all damage that one slave's own is at least."""
-
-SELDOM: Final = 0.01
-SELDOM_ALONE: Final = 0.05
-"""Chance below which it is no chance that any slave has so much of the damage; that any has all of it."""
 
 
 @dataclass(slots=True)
@@ -42,5 +38,4 @@ class SentOctets:
         if struck < ONE_STATION * damaged:
             return False
         share = self.answers[address] / max(1, self.total)
-        chance = at_least(struck, damaged, min(1.0, share)) * (len(self.answers) + 1)  # any of them, or the master
-        return chance < (SELDOM_ALONE if struck == damaged else SELDOM)
+        return not is_by_chance(struck, damaged, min(1.0, share), len(self.answers) + 1)  # any of them, or the master

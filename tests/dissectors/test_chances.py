@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dissectors.chances import MINUTE, at_least, is_rare
+from dissectors.chances import MINUTE, at_least, is_by_chance, is_rare
 
 LONG = 1_000_000
 
@@ -59,3 +59,11 @@ def test_more_than_there_are_do_not_come() -> None:
 )
 def test_few_of_very_many_are_no_more_surprising(count: int, of: int, share: float, chance: float) -> None:
     assert at_least(count, of, share) == pytest.approx(chance, rel=0.1)
+
+
+def test_of_many_senders_one_is_always_struck_most() -> None:
+    assert not is_by_chance(4, 5, 0.1, 10)
+    assert is_by_chance(3, 5, 0.1, 10)
+    assert is_by_chance(2, 2, 0.1, 10)
+    assert not is_by_chance(3, 3, 0.1, 10)  # nobody else is struck at all
+    assert is_by_chance(3, 3, 0.1, 100)
