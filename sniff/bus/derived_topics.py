@@ -63,13 +63,11 @@ class BusChannels:
         model: BusModel,
         judged_every: int = JUDGED_EVERY,
         ring_window: Callable[[], RingWindow | None] | None = None,
-        found: Callable[[], tuple[Finding, ...]] | None = None,
     ) -> None:
         """`judged_every`: windows between two looks at the findings; 0: only when asked. `ring_window`: gives what
-        changed in the ring since it was called the last time; `found`: what was found so far; else the model does.
+        changed in the ring since it was called the last time; else the model does.
         """
         self._model = model
-        self._found = model.findings if found is None else found
         self._judged_every = judged_every
         self._session = session = model.session
         self._bus = topic_part(session.bus) or "bus"
@@ -120,7 +118,7 @@ class BusChannels:
     def findings(self, now: int | None = None) -> list[DerivedMessage]:
         """Findings that are new, or graver than they were said to be. `now`: ns; else when each was last seen."""
         messages = []
-        for finding in self._found():
+        for finding in self._model.findings():
             key = finding.code, finding.subject
             before = self._said.get(key)
             if before is None or finding.severity > before:

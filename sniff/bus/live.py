@@ -278,7 +278,7 @@ class LiveBus:
     def _settle(self) -> None:
         """What depends on the settings, anew."""
         told = (self.link.paths or self._listener is not None) and not self.engine.searching
-        self._bus_channels = BusChannels(self.model, found=self.findings) if told else None
+        self._bus_channels = BusChannels(self.model) if told else None
 
     def _take(self, message: Batch) -> list[LiveTables]:
         """Take anything but reads."""
