@@ -25,9 +25,7 @@ from dissectors.rhythm import TURNS_KEPT
 
 if TYPE_CHECKING:
     from dissectors.columns import Times
-    from dissectors.modbus.exchanged import Exchanged
     from dissectors.modbus.observer import ModbusFindings
-    from dissectors.modbus.poll_order import Asked
 
 
 MANY = 64
@@ -189,7 +187,11 @@ class StretchEvidence:
         if (address != address[first[same]]).any() or (kind != kind[first[same]]).any():
             self._one_by_one(begin, end)  # the same octets, read in two ways
             return
-        self._in_order(same, [(said[0], one.key(begin + at)) for said, at in zip(numbers, first.tolist(), strict=True)])
+        if cycles.order.looks_at(len(same)):
+            places = zip(numbers, (begin + first).tolist(), strict=True)
+            cycles.order.add_all(same, [(said[0], one.key(at)) for said, at in places])
+        else:
+            cycles.order.skip(len(same))
         refused = one.found.became[which] == REFUSED
         places, started = (begin + order).tolist(), one.closed.start[which][order].tolist()
         is_refused = refused[order].tolist() if refused.any() else []
@@ -223,16 +225,6 @@ class StretchEvidence:
                 self._compare(answers.pop(0), said, request)
             if request.same is not None:
                 request.answers += answers
-
-    def _in_order(self, same: np.ndarray, asked: list[Asked]) -> None:
-        """Which requests follow which: `same` is the place of each in `asked`."""
-        order = self._judge.seen.cycles.order
-        order.add(asked[same[0]])
-        two, first, often = np.unique(same[:-1] * len(asked) + same[1:], return_index=True, return_counts=True)
-        for at in np.argsort(first).tolist():
-            before, after = divmod(int(two[at]), len(asked))
-            order.add_often((asked[before], asked[after]), int(often[at]))
-        order.newest = asked[same[-1]]
 
     def _request(self, at: int, said: bytes) -> _Request:
         """The record of what an exchange asks."""

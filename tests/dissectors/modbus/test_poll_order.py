@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import random
+
+import numpy as np
+import pytest
+
+from dissectors.modbus import poll_order
 from dissectors.modbus.poll_order import Asked, PollOrder
 
 ONE: Asked = (1, ("read", 0))
@@ -31,3 +37,26 @@ def test_whoever_comes_between_is_not_where_others_are_as_a_rule():
 
 def test_twice_is_no_habit():
     assert not ordered([ONE, TWO, ONE, TWO]).is_usual(ONE, TWO)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_many_at_once_teach_what_each_teaches_wherever_nobody_looks(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in (("_ALL", 50), ("_SOME", 7), ("_EVERY", 40)):
+        monkeypatch.setattr(poll_order, name, value)
+    dice = random.Random(seed)
+    asked = [dice.choice([ONE, TWO, PANEL]) for _ in range(400)]
+    at_once, at = PollOrder(), 0
+    while at < len(asked):
+        part = asked[at : at + dice.choice([1, 3, 20, 90])]
+        at += len(part)
+        if at_once.looks_at(len(part)):
+            each = list(dict.fromkeys(part))
+            at_once.add_all(np.array([each.index(one) for one in part]), each)
+        else:
+            at_once.skip(len(part))
+    assert at_once == ordered(asked)
+
+
+def test_another_poll_list_is_learnt_after_a_night_too():
+    order = ordered([ONE, TWO] * 50_000 + [ONE, TWO, PANEL] * 90_000)
+    assert order.is_usual(TWO, PANEL)
