@@ -50,10 +50,14 @@ class Window:
     """What came while the late answer of one station was due.
 
     `opened`: how often it was waited for; `struck`, `whole`: frames by sender; `shown`: damaged ones that show that it
-    spoke; `silenced`: requests to others that nothing followed; `behind`: damaged requests directly behind the wait.
+    spoke; `silenced`: requests to others that nothing followed; `behind`: damaged requests directly behind the wait;
+    `own`: damaged answers of its own, as of one that answers into the repeat of what it was asked; `own_behind`: those
+    of them directly behind the wait.
     """
 
     opened: int = 0
+    own: int = 0
+    own_behind: Tally = field(default_factory=Tally)
     behind: Tally = field(default_factory=Tally)
     damage: Tally = field(default_factory=Tally)
     struck: Counter[str] = field(default_factory=Counter)
@@ -97,6 +101,7 @@ class LateSpeakers:
     def __init__(self) -> None:
         self.windows: dict[int, Window] = {}  # by the station that was waited for
         self.damaged: Counter[str] = Counter()  # everywhere, by sender
+        self.overdue = 0  # damaged frames while any answer was
         self.until = 0  # when all windows are closed again
         self._open: dict[int, _Open] = {}
         self._newest: int | None = None  # who was waited for in vain, while no other request has come
@@ -134,7 +139,9 @@ class LateSpeakers:
         if self._newest is not None and start < self.until:
             self._window(self._newest).behind.add(start, *rows)
             self._newest = None
-        for other in self._due(start):
+        due = self._due(start)
+        self.overdue += bool(due)
+        for other in due:
             self._strike(other, MASTER, start, rows, self._open[other].due.is_shown_by(octets, is_answer=False))
 
     def damaged_answer(
@@ -144,19 +151,26 @@ class LateSpeakers:
         answer that was asked for, and is longer than that can be."""
         self.damaged[sender] += 1
         if start < self.until:
+            if self._newest == station:
+                self._window(station).own_behind.add(start, *rows)
             self._newest = None
-        for other in self._due(start):
+        due = self._due(start)
+        self.overdue += bool(due)
+        for other in due:
             self._window(other).whole[MASTER] += 1
             if other != station:
                 is_shown = is_longer or self._open[other].due.is_shown_by(octets, is_answer=True)
                 self._strike(other, sender, start, rows, is_shown)
             else:
+                self._window(other).own += 1
                 self._go_on(other, start)
 
     def noise(self, start: int, *rows: int | None) -> None:
         """Octets that are no frame, where nobody was asked for an answer."""
         self.damaged[NOBODY] += 1
-        for other in self._due(start):
+        due = self._due(start)
+        self.overdue += bool(due)
+        for other in due:
             self._strike(other, NOBODY, start, rows, is_shown=False)
 
     def is_due_from_another(self, station: int, start: int) -> bool:
@@ -272,12 +286,14 @@ def late_speakers(late: LateSpeakers, whole: Mapping[str, int], heard: Mapping[i
             yield found
 
 
-def is_behind(struck: int, damaged: int, silent: int, requests: int) -> bool:
+def is_behind(struck: int, damaged: int, silent: int, requests: int, *, is_late: bool = False) -> bool:
     """Whether so many damaged requests stand directly behind one station's waits in vain as chance does not explain.
 
-    `struck` of all `damaged` requests stand there; `silent` of all `requests` were to it and nothing answered them.
+    `struck` of all `damaged` requests stand there; `silent` of all `requests` were to it and nothing answered them. Of
+    the answers of one station: of its own. `is_late`: it was seen to answer late, so that half of the damage will do.
     """
-    if not _LEAST <= struck <= damaged or 5 * struck < 4 * damaged or silent >= requests:
+    most = 2 * struck >= damaged if is_late else 5 * struck >= 4 * damaged
+    if not _LEAST <= struck <= damaged or not most or silent >= requests:
         return False
     return at_least(struck, damaged, silent / requests) < _SELDOM
 

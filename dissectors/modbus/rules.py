@@ -11,7 +11,7 @@ from dissectors.modbus.rules_of_answers import ANSWER_RULES
 _OF_LINE = ("LN101", "LN103", "LN201", "LN202", "LN203", "LN204")
 
 _OF_COLLISIONS = (
-    *("MB005", "MB007", "MB008", "MB009", "MB010", "MB103", "MB104", "MB106", "MB207", "MB208"),
+    *("MB005", "MB007", "MB008", "MB009", "MB010", "MB103", "MB104", "MB106", "MB107", "MB207", "MB208"),
     *_OF_LINE,
 )
 """What two senders at once make of good frames."""
@@ -48,7 +48,7 @@ _ALL = (
         "Good answers that come after the master's timeout, often into the next request.",
         "the master's timeout is too short for this station",
         "raise the master's response timeout above the times seen here",
-        explains=("MB101", "MB104", "MB201", "MB301", "MB005", "MB010", *_OF_LINE),
+        explains=("MB101", "MB104", "MB201", "MB208", "MB301", "MB005", "MB010", *_OF_LINE),
     ),
     Rule(
         "MB104",
@@ -81,7 +81,21 @@ _ALL = (
         "raise the master's response timeout, or find out why this station is slow; nobody else's cable",
         explains=(
             *("MB001", "MB002", "MB003", "MB004", "MB005", "MB007", "MB009", "MB010", "MB019", "MB103", "MB104"),
-            *("MB105", "MB207", *_OF_LINE),
+            *("MB101", "MB105", "MB207", "MB208", *_OF_LINE),
+        ),
+    ),
+    Rule(
+        "MB107",
+        Severity.WARNING,
+        "master gives up too soon",
+        "Good answers of two stations or more that come after the master's timeout, three at least and 1 in 3 not of "
+        "the same one, where half of the stations answer late or have damage directly behind waits for them in vain, "
+        "and 3 in 4 damaged frames, if any are, stand where an answer is overdue.",
+        "the master's response timeout is shorter than its stations need; late answers fall on what it sends next",
+        "raise the master's response timeout above the slowest answer, with room; then look at what is left",
+        explains=(
+            *("MB002", "MB005", "MB007", "MB009", "MB010", "MB020", "MB022", "MB101", "MB103", "MB104", "MB106"),
+            *("MB201", "MB206", "MB207", "MB208", "MB301", "LN205", "LN303", *_OF_LINE),
         ),
     ),
     Rule(

@@ -6,13 +6,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, found, times, together
-from dissectors.late_speakers import MASTER, NOBODY, Heard, is_behind, late_speakers, told
+from dissectors.late_speakers import MASTER
 from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.damage_shares import DamageShare, shares_of_damage, to_blame
 from dissectors.modbus.finding_words import note_if, request_words, units
 from dissectors.modbus.odd_ends import OddEnd
 from dissectors.modbus.rules import RULES
+from dissectors.modbus.rules_late import of_impatience, of_late_speakers, under_late_answers
 from dissectors.modbus.rules_station import FLAWS, is_absent, of_missing, of_station, wrongly_checked
 from dissectors.modbus.rules_unheard import of_unheard
 from dissectors.words import duration, fine_milliseconds, percent
@@ -37,14 +38,15 @@ def judge(seen: BusRecord, timeout: int | None) -> tuple[Finding, ...]:
         *_of_gaps(seen),
         *_of_ends(seen),
         *_common_damage(seen, damage),
-        *_of_late_speakers(seen),
+        *of_late_speakers(seen),
+        *of_impatience(seen, timeout),
     ]
     for unit in sorted(seen.stations):
         station = seen.stations[unit]
         if unit not in unheard:
             made += of_missing(seen, unit, station, unit in scanned)
         made += of_station(seen, unit, station, timeout, f"station {unit}" not in damage.blamed)
-    return tuple(_lost_alike(made, seen.damaged_here.count))
+    return tuple(under_late_answers(tuple(_lost_alike(made, seen.damaged_here.count)), seen))
 
 
 # ---- the bus
@@ -352,32 +354,6 @@ def _common_damage(seen: BusRecord, damage: DamageShare) -> list[Finding]:
         ": of each about as much as it sends" if len(hits) > 1 else ": too few, and too close together, to say whose"
     )
     return [replace(tally.found(RULES["MB007"], "bus", words, note_if(seen.rare(damaged, asked))), count=answers)]
-
-
-def _of_late_speakers(seen: BusRecord) -> Iterator[Finding]:
-    """Stations that answer into what follows: those that are hit are not to blame for their damage."""
-    whole = {f"station {unit}": one.answered for unit, one in seen.stations.items()}
-    whole[MASTER] = whole[NOBODY] = seen.requests - seen.damaged_requests.count
-    heard = {unit: Heard(one.answered, one.late.count, one.missing.count) for unit, one in seen.stations.items()}
-    named: set[int] = set()
-    for one in late_speakers(seen.late_speakers, whole, heard):
-        hit = one.stations_hit
-        named |= {one.station, *hit}
-        severity = None if heard[one.station].answers else Severity.ERROR  # all that it says is lost
-        made = one.window.damage.found(RULES["MB106"], f"station {one.station}", told(one), severity)
-        yield replace(made, stations=(one.station, *sorted({*hit, *one.silenced} - {one.station})))
-    for unit, station in sorted(seen.stations.items()):
-        behind = seen.late_speakers.windows[unit].behind if unit in seen.late_speakers.windows else Tally()
-        silent, damaged = station.missing.count + station.late.count, seen.late_speakers.damaged[MASTER]
-        if unit not in named and station.answered and is_behind(behind.count, damaged, silent, seen.requests):
-            named.add(unit)
-            words = f"{behind.count} of {counted(damaged, 'damaged request')} came directly behind "
-            words += "a request to it that nothing had answered"
-            yield behind.found(RULES["MB106"], f"station {unit}", words)
-        many = 4 * station.outlasting.count >= station.damaged.count
-        if station.outlasting.count >= _COMMON_LEAST and many and unit not in named:
-            words = f"{counted(station.outlasting.count, 'answer')} not over when the master gave up, which then spoke"
-            yield station.outlasting.found(RULES["MB106"], f"station {unit}", f"{words} into them")
 
 
 def _cycle(seen: BusRecord) -> Iterator[Finding]:

@@ -16,6 +16,7 @@ MS = 1_000_000
 
 _FOUR = (1, 2, 3, 4)
 _late = (Said(("station 2",), ("MB106", "N2014")),)
+_impatient = (Said(("master",), ("MB107",)),)
 _late_or_unasked = (Said(("station 2",), ("N2014", "N2011")),)
 
 
@@ -59,6 +60,13 @@ _SELDOM = Modbus(
 )
 """Most of what is sent comes within three times the master's patience of one of so many late answers."""
 
+_ALL = Modbus(
+    (*usual_requests(_FOUR, 24), *usual_requests((1, 3, 4), 4)),
+    usual_stations(_FOUR),
+    (LateResponse(0.08, 200 * MS, tuple(f"unit {unit}" for unit in _FOUR)),),
+)
+"""Every station is late now and then: it is the master that does not wait."""
+
 LATE_CASES: tuple[Case, ...] = (
     _case("RTU answers into the next station, no repeats", _bus(240, retries=0)),
     _case("N2 answers into the next station", _n2(250, 15)),
@@ -75,6 +83,8 @@ FURTHER_LATE_CASES: tuple[Case, ...] = (
     _case("RTU answers into its own repeat", _bus(205, pause=5)),
     _case("RTU answers into the next station", _bus(232)),
     Case("N2 answers into the next station, FTDI", _n2(225, 30), _late_or_unasked, FTDI, seeds=1, struck=("bus",)),
+    Case("RTU all answer late", _ALL, _impatient, seeds=1, struck=("bus",)),
+    Case("RTU all answer late, FTDI", _ALL, _impatient, FTDI, seeds=1, struck=("bus",)),
     _case("RTU answers one request late", _bus(228, retries=2, pause=5)),
     _case("RTU answers into the next station, FTDI", _bus(236), FTDI),
     _case("RTU answers into the next station, CH340", _bus(232), CH340),
