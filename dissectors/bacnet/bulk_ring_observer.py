@@ -108,7 +108,7 @@ class BulkRingObserver(MstpRingObserver):
         self._holder, self._passed_by, self._token = int(columns.after[last]), None, None
         if columns.token[last]:
             self._passed_by, self._token, self._disturbed = source, frame, False
-        self._questions.asked = None
+        self._questions.asked = self._questions.late = None
         if columns.asks[last]:
             kind = int(columns.kind[last])
             self._questions.asked = AskedInRing(kind, source, destination, frame, told.first + last)

@@ -8,6 +8,7 @@ from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_hearing import hearing, takes_unheard, unheard_share
+from dissectors.bacnet.findings_of_overdue import overdue, under_late_answers
 from dissectors.bacnet.findings_of_refusals import REFUSED_KEPT, Refusals
 from dissectors.bacnet.findings_of_skipping import skipped
 from dissectors.bacnet.findings_of_tokens import silences, tokens
@@ -67,6 +68,7 @@ _TIMED: tuple[tuple[str, RingEventKind, int, str], ...] = (
 
 def judge(ring: Ring) -> tuple[Finding, ...]:
     """All findings about a ring, the gravest first, consequences as notes that name their cause."""
+    late = sorted(overdue(ring), key=lambda one: -one.finding.count)
     made = [
         *tokens(ring),
         *silences(ring),
@@ -77,8 +79,9 @@ def judge(ring: Ring) -> tuple[Finding, ...]:
         *_answers(ring),
         *_for_others(ring),
         *waiting(impatient(ring)),
+        *late,
         *hearing(ring),
-        *damage(ring),
+        *under_late_answers(damage(ring), late, ring),
         *duplicates(ring),
         *use(ring),
     ]

@@ -59,6 +59,7 @@ def _skipped_by(ring: Ring, mac: int, node: RingNode) -> tuple[int, int, int] | 
     used = node.tokens_sent and node.tokens_received and node.last > node.last_token > ring.hole
     if not used or node.last_polled > node.last_token or mac > MAX_MASTER:
         return None
+    has_noise = ring.noise + ring.header_errors + ring.data_errors + ring.cut > 0
     for (by, following), edge in ring.edges.items():
         past = lies_between(mac, by, following) and edge.since > node.last_token and edge.streak >= SKIPPED_ROUNDS
         if not past or any(source == by and other.last > edge.last for (source, _), other in ring.edges.items()):
@@ -70,7 +71,8 @@ def _skipped_by(ring: Ring, mac: int, node: RingNode) -> tuple[int, int, int] | 
         alive = node.last > edge.since  # heard, while the token goes past it
         polled = sum(source == by and time > node.last_token for (source, _), time in ring.polled.items())
         went_round = edge.streak >= N_POLL * (polled + 2)  # by now it has polled all that it ever polls, this one not
-        if (alive and went_round) or not beyond:  # else it looked for a successor, and may have lost this one before
+        # else it looked for a successor, and may have lost this one before: under noise that may have gone unheard
+        if (alive and went_round) or (not beyond and (went_round or not has_noise)):
             return by, following, edge.streak
     return None
 

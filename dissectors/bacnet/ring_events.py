@@ -41,6 +41,7 @@ class RingEventKind(Enum):
     ILLEGAL = "an address or length that the standard forbids"
     BROADCAST_REQUEST = "a broadcast that asks for a reply"
     UNHEARD = "sent what was not heard here"
+    OVERDUE = "damage while an answer is overdue"  # of whose it is, with who asked; of nobody, with who sent the frame
     OVERTAKEN = "went on before its answer came"
     SELF_TOKEN = "passed the token to itself"
 

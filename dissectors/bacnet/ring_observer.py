@@ -71,6 +71,7 @@ class MstpRingObserver(TokenWatch):
                 if isinstance(event, Noise):
                     self._turn.see_noise(event)
                 if len(event.octets) >= N_MIN_OCTETS:  # fewer prove nothing: who was asked may still answer
+                    self._note_overdue(no, event.start)
                     self._questions.asked = None
                     self._disturb(no, event.start)
                 self._doubt, self._broke_off, self._disturbed = True, False, True
@@ -136,6 +137,8 @@ class MstpRingObserver(TokenWatch):
         tally, asked = self._tally, self._questions.asked
         self._broke_off = not self._doubt and breaks_off(frame, self._holder)
         speaker = speaker_of(frame, header, self._turn)
+        if self._note_overdue(no, frame.start):
+            tally.note(RingEventKind.OVERDUE, frame.start, no, None, None if speaker is None else speaker.source)
         count_damage(tally, no, frame, None if self._disturb(no, frame.start) else speaker)
         self._questions.asked = None
         if asked is None or speaker is None or asked.frame_type == _POLL:
@@ -147,6 +150,13 @@ class MstpRingObserver(TokenWatch):
             assert header.destination is not None
             self._questions.asked = AskedInRing(header.function, header.source, header.destination, frame, no)
         self._doubt = self._disturbed = True
+
+    def _note_overdue(self, no: int, start: int) -> bool:
+        """Whether answers are overdue where something is damaged; note whose."""
+        overdue = self._questions.overdue(start)
+        for server, client in overdue:
+            self._tally.note(RingEventKind.OVERDUE, start, no, server, client)
+        return bool(overdue)
 
     def _disturb(self, no: int, start: int) -> bool:
         """Whether octets that are no good frame may be of two: of the next one, and of one that has a second token."""
@@ -183,7 +193,7 @@ class MstpRingObserver(TokenWatch):
         check_addresses(tally, no, frame, frame_type, source, destination)
         if source != self._holder:
             self._disturbed = True
-        self._breaks_in = source != self._holder and not answers
+        self._breaks_in = source != self._holder and (not answers or self._questions.late is not None)
         if self._doubt and not answers and frame_type in AT_ONCE:
             self._answers_unread(destination)
         if frame_type == _TOKEN:

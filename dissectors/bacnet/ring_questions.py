@@ -6,7 +6,7 @@ from collections import OrderedDict, deque
 from dataclasses import dataclass
 
 from dissectors.bacnet import message as messages
-from dissectors.bacnet.frame_types import CARRIES_NPDU, PROPRIETARY, FrameType
+from dissectors.bacnet.frame_types import CARRIES_NPDU, EXPECTING, PROPRIETARY, FrameType
 from dissectors.bacnet.held_reads import HeldReads, surely_over
 from dissectors.bacnet.limits import MAX_MASTER, MS, T_NO_TOKEN, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.message import data_of, more_follows
@@ -22,10 +22,14 @@ _UNANSWERED_MAX = 32
 T_LATE_ANSWER = 2 * T_NO_TOKEN
 """An answer that comes after its asker gave up is still one within this time."""
 
+T_OVERDUE = T_NO_TOKEN
+"""Until when damage may come of an answer that is late: most are so by little, and later all else strikes as well."""
+
 T_GO_ON = 100 * MS
 """The longest time that any text lets a station wait for the answer to a poll (Tusage_timeout)."""
 
 _POLL, _TEST = int(FrameType.POLL_FOR_MASTER), int(FrameType.TEST_REQUEST)
+_ASKS = frozenset(map(int, EXPECTING))
 _NO_ANSWERS = frozenset(
     (FrameType.TOKEN, FrameType.POLL_FOR_MASTER, FrameType.REPLY_TO_POLL_FOR_MASTER, FrameType.TEST_REQUEST)
 )
@@ -54,6 +58,7 @@ class RingQuestions:
     """`asked` is what must be answered now; those given up, and those postponed, are remembered, bounded.
 
     `doubt`: something may have been missed since the last good frame. `holder`: who has the token, as far as known.
+    `late`: who sent the newest good frame, where that was an answer for which nobody waited any more.
     `alone_since`: the earliest that the frame before may have begun, None where it has no time of its own.
     """
 
@@ -61,6 +66,7 @@ class RingQuestions:
         self.asked: AskedInRing | None = None
         self.doubt = True
         self.holder: int | None = None
+        self.late: int | None = None
         self.alone_since: int | None = None
         self._tally = tally
         self._reads = reads
@@ -75,13 +81,13 @@ class RingQuestions:
 
     def forget(self) -> None:
         """Octets were missed: nobody is measured against what was asked before."""
-        self.asked = None
+        self.asked = self.late = None
         self._unanswered.clear()
         self._postponed.clear()
 
     def is_answer(self, no: int, frame: Frame, frame_type: int, source: int, destination: int, node: NodeTally) -> bool:
         """Close what waits for an answer; say whether this frame of `node` is it, now or late."""
-        asked, self.asked = self.asked, None
+        asked, self.asked, self.late = self.asked, None, None
         if asked is not None and self._answers(asked, no, frame, frame_type, source, destination, node):
             return True
         if not self._unanswered or source == self.holder or frame_type not in CARRIES_NPDU:
@@ -95,6 +101,17 @@ class RingQuestions:
     def owes(self, server: int, client: int) -> bool:
         """Whether a station may still answer what it was asked: it postponed its answer, or has given none."""
         return (server, client) in self._unanswered or (server, client) in self.postponed
+
+    def overdue(self, start: int) -> list[tuple[int, int]]:
+        """Whose answer, and to whom, is overdue at that time: it may fall on what is sent then."""
+        waiting = [one for one in self._unanswered.values() if one.missed]
+        if self.asked is not None and self.asked.frame_type in _ASKS and not self.asked.free:
+            waiting.append(self.asked)
+        return [
+            (one.destination, one.source)
+            for one in waiting
+            if T_REPLY_DELAY < start - one.frame.end <= T_OVERDUE and one.frame.ok
+        ]
 
     def is_searching(self, frame: Frame) -> bool:
         """Whether a frame goes on with the search of the newest poll, to the next address: no station that has lost the
@@ -220,6 +237,7 @@ class RingQuestions:
         if asked.overtaken is not None:
             self._unheard.overtaken(asked.no, asked.frame, asked.overtaken)
         if took > T_REPLY_DELAY:  # sooner is in time, however soon the other one went on
+            self.late = source
             self._tally.note(RingEventKind.LATE_REPLY, frame.start, no, source, destination, took)
         return True
 

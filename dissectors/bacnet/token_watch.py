@@ -97,6 +97,8 @@ class TokenWatch:
                 unknown = disturbed or self._were_all_silent(silence - frame.slack)
                 holder = None if unknown else self._holder
                 tally.note(RingEventKind.LOST_TOKEN, frame.start, no, holder, source, silence)
+                if (late := self._questions.late) is not None and not self._doubt:  # whoever hears it lets go
+                    tally.note(RingEventKind.OVERDUE, frame.start, no, late, self._holder)
                 begin_search(tally.node(source), frame.start)
         self._forget()
 

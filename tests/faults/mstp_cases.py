@@ -210,6 +210,18 @@ MSTP_CASES: tuple[Case, ...] = (
         struck=("MAC 5", "MAC 9", "1 → 5"),
         seconds=30,
     ),
+    *(
+        Case(
+            f"MS/TP answers when its asker has given up, {delay} ms",
+            Ring((_one, _two, _with(_five, settings={"faults": {"reply_delay": delay * MS}}), _nine)),
+            (("MS308", "MAC 5"),),
+            also=("MS101",),  # it is given tokens while it answers
+            struck=("2 → 5", "1 → 5"),
+            seconds=20,
+            seeds=1,
+        )
+        for delay in (300, 340)
+    ),
     Case(
         "MS/TP several stations shut out",
         Ring(

@@ -1,0 +1,60 @@
+"""Findings about stations whose late answers fall on what others send.
+
+Who answers later than it may does so when somebody else has the token: two senders at once are no frame, and whoever is
+hit looks damaged, or as if it had lost a token. It shows by where the damage stands: while an answer is overdue.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from dissectors.bacnet.limits import T_REPLY_DELAY
+from dissectors.bacnet.ring import Ring
+from dissectors.bacnet.ring_events import RingEventKind
+from dissectors.bacnet.ring_questions import T_OVERDUE
+from dissectors.bacnet.ring_remarks import Remark, measured, of
+from dissectors.bacnet.rules import RULES
+from dissectors.chances import at_least
+from dissectors.findings import as_consequence, counted, times
+
+STRUCK_LEAST, SELDOM = 3, 0.002
+"""For a station that was heard to answer late."""
+
+ALONE_LEAST, ALONE_SHARE, ALONE_SELDOM = 5, 0.75, 1e-6
+"""For one that was not, since all that it says late is damaged: it is behind requests to it that damage stands, and to
+hardly anybody else."""
+
+
+def overdue(ring: Ring) -> Iterable[Remark]:
+    """Who answers into what comes next, where that is half of the damage and more."""
+    damaged = ring.header_errors + ring.data_errors + ring.cut
+    then = ring.of(RingEventKind.OVERDUE).count
+    if 2 * then < damaged or not ring.span:
+        return
+    every = sum(ring.of(RingEventKind.OVERDUE, mac).count for mac in ring.nodes)
+    for mac in ring.nodes:
+        struck, late = ring.of(RingEventKind.OVERDUE, mac), ring.of(RingEventKind.LATE_REPLY, mac).count
+        waits = ring.of(RingEventKind.NO_REPLY, mac).count + late or struck.count
+        share = min(1.0, waits * (T_OVERDUE - T_REPLY_DELAY) / ring.span)
+        chance = at_least(struck.count, max(struck.count, damaged), share)
+        is_late = late and struck.count >= STRUCK_LEAST and chance < SELDOM
+        is_alone = struck.count >= max(ALONE_LEAST, ALONE_SHARE * every) and chance < ALONE_SELDOM
+        if not is_late and not is_alone:
+            continue
+        seen = (
+            f"damage, or a token that was lost, {times(struck.count)} within {measured(T_OVERDUE)} of a request to it "
+            f"that it had not answered in {measured(T_REPLY_DELAY)}"
+        )
+        seen += f"; in all {then} of {counted(damaged, 'damaged frame')} stand behind such requests" if damaged else ""
+        yield of("MS308", mac, seen, struck)
+
+
+def under_late_answers(remarks: Iterable[Remark], late: Sequence[Remark], ring: Ring) -> Iterable[Remark]:
+    """What is said of damage; that of stations whose frames are hit by late answers is under the first of these."""
+    hit = ring.of(RingEventKind.OVERDUE).others
+    for one in remarks:
+        node = None if one.mac is None else ring.nodes.get(one.mac)
+        if late and node is not None and 2 * hit.get(one.mac, 0) >= node.damaged:
+            yield Remark(one.mac, as_consequence(one.finding, late[0].finding, RULES))
+        else:
+            yield one
