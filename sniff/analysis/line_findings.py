@@ -153,6 +153,7 @@ class LineFindings:
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""
         self._patterns.add_line_event(event)
+        self._use.add_line_event(event)
         kind = event.kind
         if kind is LineEventKind.DROPPED:
             self._lost.add(event.time)

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 from dissectors.findings import EVIDENCE_MAX, Finding, Severity, Tally, found
 from dissectors.frame import Event, Frame, Role
 from dissectors.line import NS_PER_S, LineSettings
+from sniff.analysis.holes import Holes
 from sniff.analysis.line_rules import LINE_RULES as RULES
+from sniff.engine.session import LineEvent
 
 if TYPE_CHECKING:
     from dissectors.columns import Times
@@ -57,9 +59,16 @@ class LineUse:
         self._broadcast_busy = 0
         self._first: int | None = None
         self._last = 0
+        self._holes = Holes()
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Take what happened to the line."""
+        if event.kind.is_hole:
+            self._holes.miss(event, self._char)
 
     def see(self, no: int, event: Event, role: Role) -> None:
         """Take the next row."""
+        self._holes.see(event.start, event.end)
         self._first = event.start if self._first is None else self._first
         self._last = max(self._last, event.end)
         busy = len(event.octets) * self._char
@@ -75,6 +84,7 @@ class LineUse:
 
         starts, ends = table.frames.start, table.frames.end
         busy = table.frames.length.astype(np.int64) * self._char
+        self._holes.take(starts, ends)
         self._last = max(self._last, int(ends.max()))
         self._busy += int(busy.sum())
         seconds = ends // NS_PER_S
@@ -135,7 +145,7 @@ class LineUse:
         noted, full = self._most[SHORT], self._most[LONG]
         if noted >= BUSY or full >= FULL:
             span = LONG if full >= FULL else SHORT
-            average = min(1.0, self._busy / max(1, self._last - (self._first or 0)))
+            average = min(1.0, self._busy / self._heard)
             most = min(1.0, self._most[span])
             seen = f"octets on the line in {most:.0%} of {span} s at the busiest, {average:.0%} of all time"
             is_sure = full >= FULL and not self._is_assumed and self._most[span] <= MORE_THAN_ALL
@@ -149,15 +159,19 @@ class LineUse:
             )
             yield told if self._most[span] <= MORE_THAN_ALL else self._too_many(told, span)
         share = self._broadcast_busy / self._busy if self._busy else 0.0
-        duration = self._last - (self._first or 0)
-        of_time = self._broadcast_busy / max(1, duration)
+        of_time = self._broadcast_busy / self._heard
         if self._broadcast.count >= BROADCASTS_LEAST and share >= BROADCASTS_NOTED and of_time >= BROADCASTS_FELT:
-            rate = self._broadcast.count * NS_PER_S / max(1, duration)
+            rate = self._broadcast.count * NS_PER_S / self._heard
             seen = f"{self._broadcast.count} broadcasts, {share:.0%} of all octets"
             seen += "" if self._is_assumed else f", {of_time:.0%} of all time"
             is_costly = BROADCASTS_TOO_MANY <= share < ONLY_BROADCASTS and of_time >= BROADCASTS_COSTLY
             severity = Severity.WARNING if is_costly and not self._is_assumed else Severity.NOTE
             yield self._broadcast.found(RULES["LN402"], "bus", f"{seen}, {rate:.1f} a second", severity)
+
+    @property
+    def _heard(self) -> int:
+        """ns from the first octet to the last without the holes; at least 1."""
+        return max(1, self._last - (self._first or 0) - self._holes.total)
 
     def _too_many(self, told: Finding, span: int) -> Finding:
         """Of more octets than the line can carry: what is known of it is wrong, and the bus may have all the room."""

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from dissectors.frame import Frame
 from dissectors.line import NS_PER_S, LineSettings
+from sniff.analysis.holes import Holes
 from sniff.engine.engine import Row
+from sniff.engine.session import LineEvent
 
 if TYPE_CHECKING:
     import numpy as np
@@ -48,7 +50,8 @@ class Second:
 
 @dataclass(slots=True)
 class Load:
-    """Totals, and the last seconds one by one: the newest `kept` of them, and up to a sixteenth more."""
+    """Totals, and the last seconds one by one: the newest `kept` of them, and up to a sixteenth more. What nobody heard
+    (`holes`) is no time of which a share is told."""
 
     line: LineSettings
     total: Second = field(default_factory=Second)
@@ -56,12 +59,19 @@ class Load:
     first: int | None = None  # ns
     last: int | None = None
     kept: int = KEPT_SECONDS
+    holes: Holes = field(default_factory=Holes)
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Take what happened to the line."""
+        if event.kind.is_hole:
+            self.holes.miss(event, self.line.char)
 
     def add(self, row: Row) -> None:
         """Count one row; what a search heard with other settings is no load."""
         if row.searched is not None:
             return
         event = row.event
+        self.holes.see(event.start, event.end)
         self.first = event.start if self.first is None else min(self.first, event.start)
         self.last = event.end if self.last is None else max(self.last, event.end)
         number = event.end // NS_PER_S
@@ -93,8 +103,6 @@ class Load:
         if not len(ends):
             return
         octets, is_frame, ok = table.frames.length[heard], table.is_frame[heard], table.good[heard]
-        self.first = int(starts.min()) if self.first is None else min(self.first, int(starts.min()))
-        self.last = int(ends.max()) if self.last is None else max(self.last, int(ends.max()))
         numbers = ends // NS_PER_S
         base = int(numbers.min()) - 1
         early = octets.astype(np.int64) * self.line.char - (ends - numbers * NS_PER_S)  # of the second before
@@ -103,6 +111,9 @@ class Load:
                 for row in output.rows:
                     self.add(row)
             return
+        self.holes.take(starts, ends)
+        self.first = int(starts.min()) if self.first is None else min(self.first, int(starts.min()))
+        self.last = int(ends.max()) if self.last is None else max(self.last, int(ends.max()))
         places, least = numbers - base, int(numbers.max()) - base + 1
         begun = np.flatnonzero(early > 0)
         noise = np.flatnonzero(~is_frame)
@@ -136,7 +147,8 @@ class Load:
         firsts = [time for time in (self.first, other.first) if time is not None]
         lasts = [time for time in (self.last, other.last) if time is not None]
         first, last = min(firsts, default=None), max(lasts, default=None)
-        return Load(self.line, self.total.merge(other.total), seconds, first, last, self.kept)
+        holes = self.holes.merge(other.holes)
+        return Load(self.line, self.total.merge(other.total), seconds, first, last, self.kept, holes)
 
     def _second(self, number: int) -> Second:
         second = self.seconds.get(number)
@@ -157,21 +169,34 @@ class Load:
         newest = end // NS_PER_S
         numbers = range(max(newest - over + 1, self.first // NS_PER_S), newest + 1)
         busy = sum(self.seconds[number].busy for number in numbers if number in self.seconds)
-        span = max(end - max(self.first, numbers.start * NS_PER_S), self.line.char)
-        return min(1.0, busy / span)
+        begin = max(self.first, numbers.start * NS_PER_S)
+        return min(1.0, busy / max(end - begin - self.holes.within(begin, end, now), self.line.char))
 
     def share_of(self, part: Second, start: int, end: int) -> float:
         """Bus load, 0 … 1, of a stretch (ns) whose seconds together are `part`; only what the capture covers counts."""
         return min(1.0, part.busy / max(self.heard_of(start, end), self.line.char))
 
     def heard_of(self, start: int, end: int) -> int:
-        """How much of a stretch (ns) the capture covers, from the first octet to the last, ns."""
+        """How much of a stretch (ns) the capture covers, from the first octet to the last without its holes, ns."""
         if self.last is None or self.first is None:
             return 0
-        return max(0, min(end, self.last) - max(start, self.first))
+        start, end = max(start, self.first), min(end, self.last)
+        return max(0, end - start - self.holes.within(start, end))
 
     def overall(self) -> float:
         """Bus load, 0 … 1, over the whole capture."""
         if self.last is None or self.first is None or self.last <= self.first:
             return 0.0
-        return min(1.0, self.total.busy / (self.last - self.first))
+        return min(1.0, self.busy / max(self.listened, self.line.char))
+
+    @property
+    def busy(self) -> int:
+        """ns with octets on the wire, lost ones that were counted among them."""
+        return self.total.busy + self.holes.counted
+
+    @property
+    def listened(self) -> int:
+        """ns from the first octet to the last of which it is known how busy the bus was."""
+        if self.last is None or self.first is None:
+            return 0
+        return max(0, self.last - self.first - self.holes.total + self.holes.counted)

@@ -132,6 +132,7 @@ class Summary:
     def add_line_event(self, event: LineEvent) -> None:
         """Count something that happened to the line."""
         self.events[event.kind] += 1
+        self.load.add_line_event(event)
 
     def _add_row(self, row: Row) -> None:
         event = row.event

@@ -11,7 +11,7 @@ from dissectors.findings import counted
 from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.tracker import Verdict
-from dissectors.words import milliseconds
+from dissectors.words import duration, milliseconds
 from sniff.analysis.nodes import Node
 from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.summary import Summary, ranked
@@ -172,13 +172,15 @@ def _print(
     if summary.load.first is None or summary.load.last is None:
         _line("content", "no octets" if not summary.searched else "only what was heard while searching for settings")
     else:
+        missed = summary.load.holes.total
+        unheard = f", {duration(missed)} of it not heard" if missed else ""
         if not session.has_times:
             _line("times", "none: the file does not say when anything came")
         elif session.started < UNDATED:
-            _line("times", f"{_span(summary.seconds)}; the file has no date")
+            _line("times", f"{_span(summary.seconds)}{unheard}; the file has no date")
         else:
             _line("from", iso(summary.load.first))
-            _line("to", f"{iso(summary.load.last)} ({_span(summary.seconds)})")
+            _line("to", f"{iso(summary.load.last)} ({_span(summary.seconds)}{unheard})")
     _line("protocol", _settings(session))
     if summary.searched or session.unknown:
         _line("search", _search(session, summary, events))

@@ -36,10 +36,10 @@ class BusDay:
     """One bus on one day of UTC, from one capture or several.
 
     `site`, `bus`, `port`, `protocol`: which; `day`: "2026-03-01". `summary`: counts, stations, response times; its load
-    is only a total. `busy`: ns with octets on the line, `listened`: ns between first and last octet, of all captures
-    together that say when anything came; `first`, `last`: when that was. `latency`: ns that the slowest adapter may
-    have held octets back. `sources`: the files. `notes`: what was wrong with them, in words. `judged`: of each capture,
-    in any order.
+    is only a total. `busy`: ns with octets on the line, `listened`: ns between first and last octet without holes, of
+    all captures together that say when anything came; `first`, `last`: when that was. `latency`: ns that the slowest
+    adapter may have held octets back. `sources`: the files. `notes`: what was wrong with them, in words. `judged`: of
+    each capture, in any order.
     """
 
     site: str
