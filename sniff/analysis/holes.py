@@ -57,12 +57,12 @@ class Holes:
     _open: _Open | None = None
     _early: _Open | None = None  # that before the first row, which a part of a capture may begin with
 
-    def miss(self, event: LineEvent, char: int) -> None:
-        """Take a hole. `char`: ns that an octet takes."""
+    def miss(self, event: LineEvent, char: int | None = None) -> None:
+        """Take a hole. `char`: ns that an octet takes; None: it does not matter that lost ones were counted."""
         hole = _Open(event.time, None, event.time, False)
         if event.kind is LineEventKind.UNPLUGGED:
             hole.begin, hole.end = event.time, None
-        elif event.kind is LineEventKind.DROPPED and event.count > 0:
+        elif event.kind is LineEventKind.DROPPED and event.count > 0 and char is not None:
             hole.begin, hole.is_counted = event.time - event.count * char, True
         if self._open is None:
             self._open = hole
@@ -115,6 +115,16 @@ class Holes:
         known: npt.NDArray[np.int64] = np.array(self.ends, np.int64)
         apart: Masks = known.searchsorted(begins, "right") < known.searchsorted(ends, "right")
         return apart
+
+    def before(self, time: int, near: int) -> int:
+        """For how long nobody had heard anything at a time, where a hole ended so near to it; ns."""
+        at = bisect_right(self.ends, time) - 1
+        return time - self.begins[at] if at >= 0 and time - self.ends[at] <= near else 0
+
+    def after(self, time: int, near: int) -> int:
+        """For how long nobody heard anything from a time on, where a hole began so near to it; ns."""
+        at = bisect_left(self.begins, time)
+        return self.ends[at] - time if at < len(self.begins) and self.begins[at] - time <= near else 0
 
     def merge(self, later: Holes) -> Holes:
         """With those of a later stretch of the same bus, as a new value."""

@@ -10,6 +10,7 @@ from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
 from dissectors.questions import Question
 from dissectors.tracker import Verdict
+from sniff.analysis.holes import Holes
 
 MOST_SLICES = 256
 """Stretches of time in which the requests of one entry are counted; beyond it each becomes twice as long."""
@@ -76,7 +77,7 @@ class Poll:
     `asked`: requests, repeats not among them (`repeats`); `verdicts`: of both; `late`: answers that came too late, to
     requests that stand in `verdicts` as without. `first`, `last`: begin of the first and of the last request;
     `newest`: of the last that is no repeat. `every`: from one request to the next, without repeats; `between`: with
-    them. `latency`: of answers. `slices`: how many were asked when, without repeats.
+    them; neither over a hole. `latency`: of answers. `slices`: how many were asked when, without repeats.
     """
 
     key: PollKey
@@ -94,11 +95,13 @@ class Poll:
     slices: Slices = field(default_factory=Slices)
     request: int = 0  # number of the row of the last request
 
-    def add(self, start: int, attempt: int, verdict: Verdict, latency: int | None, request: int) -> None:
-        """Take a request that closed."""
+    def add(
+        self, start: int, attempt: int, verdict: Verdict, latency: int | None, request: int, holes: Holes | None = None
+    ) -> None:
+        """Take a request that closed. `holes`: over which there is no interval, since requests may be missing."""
         self.verdicts[verdict] += 1
         self.request = request
-        if self.last is not None:
+        if self.last is not None and not _are_apart(self.last, start, holes):
             self.between.add(start - self.last)
         self.first = start if self.first is None else self.first
         self.last = start
@@ -106,7 +109,7 @@ class Poll:
             self.repeats += 1
         else:
             self.asked += 1
-            if self.newest is not None:
+            if self.newest is not None and not _are_apart(self.newest, start, holes):
                 self.every.add(start - self.newest)
             self.begun = start if self.begun is None else self.begun
             self.newest = start
@@ -150,12 +153,12 @@ class Poll:
         apart = self.cycle.apart(0.05, 0.95)
         return None if apart is None or self.cycle.count < 2 else apart // 2
 
-    def merge(self, later: Poll) -> Poll:
-        """With what a later stretch saw of the same entry, as a new value."""
+    def merge(self, later: Poll, holes: Holes | None = None) -> Poll:
+        """With what a later stretch saw of the same entry, as a new value. `holes`: of both."""
         every, between = self.every.merge(later.every), self.between.merge(later.between)
-        if self.newest is not None and later.begun is not None:
+        if self.newest is not None and later.begun is not None and not _are_apart(self.newest, later.begun, holes):
             every.add(later.begun - self.newest)
-        if self.last is not None and later.first is not None:
+        if self.last is not None and later.first is not None and not _are_apart(self.last, later.first, holes):
             between.add(later.first - self.last)
         return replace(
             self,
@@ -173,3 +176,7 @@ class Poll:
             slices=self.slices.merge(later.slices),
             request=later.request or self.request,
         )
+
+
+def _are_apart(begin: int, end: int, holes: Holes | None) -> bool:
+    return holes is not None and holes.lie_between(begin, end)

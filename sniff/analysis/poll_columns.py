@@ -15,6 +15,7 @@ from dissectors.frame import Frame, Role
 from dissectors.histogram import add_grouped
 from dissectors.questions import Question, Stems
 from dissectors.tracker import PASSING, Verdict
+from sniff.analysis.holes import Holes
 from sniff.analysis.poll import TIMED, UNASKED, Poll, PollKey
 from sniff.analysis.polls import Asked, asks, closed_of, counts
 from sniff.engine.table import Table, rows_at
@@ -36,7 +37,9 @@ _TIMED = np.array([verdict in TIMED for verdict in VERDICTS])
 
 def add_table(polls: Polls, table: Table) -> None:
     """Give a programme the table that follows."""
-    closed = table.transactions
+    closed, heard = table.transactions, table.heard
+    if heard.any():
+        polls.holes.take(table.frames.start[heard], table.frames.end[heard])
     passing = np.array([name in PASSING for name in closed.names])
     counted_ones = ~passing[closed.kind] & ~_UNASKED[closed.verdict] & (closed.request != NONE)
     place = closed.request - table.first
@@ -112,8 +115,8 @@ def _add(polls: Polls, table: Table, chosen: Times, rows: Times) -> None:
         poll.request = int(closed.request[end - 1])
     for (number, verdict), count in counted(which, closed.verdict) if len(which) else ():
         held[number].verdicts[VERDICTS[verdict]] += count
-    _between_all(held, which, closed.start)
-    _between_firsts(held, which[firsts], closed.start[firsts])
+    _between_all(held, which, closed.start, polls.holes)
+    _between_firsts(held, which[firsts], closed.start[firsts], polls.holes)
     timed = (closed.latency != NONE) & _TIMED[closed.verdict]
     add_grouped(lambda number: held[number].latency, which[timed], closed.latency[timed])
     missed = np.flatnonzero(closed.verdict == _MISSED)
@@ -129,7 +132,7 @@ def _stretches(which: Times) -> tuple[Times, Times]:
     return begins, np.append(begins[1:], len(which))
 
 
-def _between_all(held: list[Poll], which: Times, starts: Times) -> None:
+def _between_all(held: list[Poll], which: Times, starts: Times, holes: Holes) -> None:
     """From each request to the next of its entry."""
     begins, ends = _stretches(which)
     befores: list[int | None] = []
@@ -138,10 +141,10 @@ def _between_all(held: list[Poll], which: Times, starts: Times) -> None:
         befores.append(poll.last)
         poll.first = int(starts[begin]) if poll.first is None else poll.first
         poll.last = int(starts[end - 1])
-    add_grouped(lambda number: held[number].between, *_steps(which, starts, begins, befores))
+    add_grouped(lambda number: held[number].between, *_steps(which, starts, begins, befores, holes))
 
 
-def _between_firsts(held: list[Poll], which: Times, starts: Times) -> None:
+def _between_firsts(held: list[Poll], which: Times, starts: Times, holes: Holes) -> None:
     """The same without repeats."""
     begins, ends = _stretches(which)
     befores: list[int | None] = []
@@ -151,14 +154,16 @@ def _between_firsts(held: list[Poll], which: Times, starts: Times) -> None:
         poll.begun = int(starts[begin]) if poll.begun is None else poll.begun
         poll.newest = int(starts[end - 1])
         _slice(poll, starts[begin:end])
-    add_grouped(lambda number: held[number].every, *_steps(which, starts, begins, befores))
+    add_grouped(lambda number: held[number].every, *_steps(which, starts, begins, befores, holes))
 
 
-def _steps(which: Times, starts: Times, begins: Times, befores: list[int | None]) -> tuple[Times, Times]:
-    """Entry and time since the request before it, of all that have one. `befores`: that of the first of each entry."""
+def _steps(which: Times, starts: Times, begins: Times, befores: list[int | None], holes: Holes) -> tuple[Times, Times]:
+    """Entry and time since the request before it, of all that have one and no hole between. `befores`: that of the
+    first of each entry."""
     steps, known = np.diff(starts, prepend=starts[:1]), np.ones(len(which), bool)
     known[begins] = [before is not None for before in befores]
     steps[begins] = starts[begins] - np.array([before or 0 for before in befores], np.int64)
+    known &= ~holes.are_between(starts - steps, starts)
     return which[known], steps[known]
 
 

@@ -14,6 +14,7 @@ from dissectors.profiles.decoding import plain_name
 from dissectors.profiles.model import Profile
 from dissectors.questions import Span
 from dissectors.words import duration
+from sniff.analysis.holes import Holes
 from sniff.analysis.poll import Poll
 
 MOST_NAMES = 3
@@ -90,35 +91,54 @@ class Change:
     interval: int | None = None
 
 
-def changes(poll: Poll, begin: int, end: int) -> list[Change]:
-    """When an entry came, went, or was asked oftener or more seldom. `begin`, `end`: of the whole programme, ns."""
+def changes(poll: Poll, begin: int, end: int, holes: Holes | None = None) -> list[Change]:
+    """When an entry came, went, or was asked oftener or more seldom. `begin`, `end`: of the whole programme, ns; what
+    was asked in its `holes` nobody knows."""
     if poll.first is None or poll.last is None or poll.asked < _FEW:
         return []
-    found, spare = [], max(2 * (poll.cycle.most or 0), SPARE)
-    if poll.first - begin > spare:
-        found.append(Change(ChangeKind.BEGAN, poll.first, 0, poll.interval))
-    found += _turns(poll)
-    if end - poll.last > spare:
-        found.append(Change(ChangeKind.ENDED, poll.last, 0))
+    holes = holes or Holes()
+    found, spare, near = [], max(2 * (poll.cycle.most or 0), SPARE), 2 * (poll.interval or 0)
+    if poll.first - begin - holes.within(begin, poll.first) > spare:
+        found.append(Change(ChangeKind.BEGAN, poll.first, holes.before(poll.first, near), poll.interval))
+    found += _turns(poll, holes)
+    if end - poll.last - holes.within(poll.last, end) > spare:
+        found.append(Change(ChangeKind.ENDED, poll.last, holes.after(poll.last, near)))
     return found
 
 
-def _turns(poll: Poll) -> list[Change]:
+def _turns(poll: Poll, holes: Holes) -> list[Change]:
     """Where the rate became another one for good: two stretches after each other that differ from those before. Only
     of what is asked by the clock: what comes in bursts changes all the time."""
     counts, width, interval = poll.slices.counts, poll.slices.width, poll.every.mean
     if not counts or not interval:
         return []
     step = max(1, math.ceil(_GROUP * interval / width))  # slices of a stretch
-    low, high = min(counts), max(counts)
+    low, high, long = min(counts), max(counts), step * width
     groups = [0] * ((high - low) // step + 1)
     for place, count in counts.items():
         groups[(place - low) // step] += count
-    groups = groups[1:-1]  # the outer ones may not be whole
+    whole = range(1, len(groups) - 1)  # the outer ones may not be whole
+    heard = [at for at in whole if not holes.within(low * width + at * long, low * width + (at + 1) * long)]
+    groups = [groups[at] for at in heard]
     if len(groups) < 4 or not _is_even(groups):
         return []
-    begin, long = (low + step) * width, step * width
+    turns = _turning(groups)
     found: list[Change] = []
+    for at, until in pairwise([*turns, len(groups)]):
+        after = groups[at + 1 : min(until, at + 1 + _AFTER)]  # the first is partly as it was before
+        rate, time = sum(after) / len(after), low * width + heard[at] * long
+        within = (heard[at] - heard[at - 1]) * long
+        found.append(
+            Change(ChangeKind.CHANGED, time, within, round(long / rate))
+            if rate
+            else Change(ChangeKind.PAUSED, time, within)
+        )
+    return found
+
+
+def _turning(groups: Sequence[int]) -> list[int]:
+    """The stretches from which on there are more or fewer."""
+    found: list[int] = []
     since = 0
     for at in range(2, len(groups) - 1):
         if at - since < 2:
@@ -126,15 +146,8 @@ def _turns(poll: Poll) -> list[Change]:
         mean = sum(groups[since:at]) / (at - since)
         by = groups[at] - mean, groups[at + 1] - mean
         if min(map(abs, by)) >= max(0.4 * mean, 3) and (by[0] > 0) == (by[1] > 0):
-            since = at
-            after = groups[at : at + _AFTER]
-            rate, time = sum(after) / len(after), begin + at * long
-            change = (
-                Change(ChangeKind.CHANGED, time, long, round(long / rate))
-                if rate
-                else Change(ChangeKind.PAUSED, time, long)
-            )
-            found.append(change)
+            since = at + 1
+            found.append(at)
     return found
 
 

@@ -14,6 +14,7 @@ from dissectors.frame import Frame, Role
 from dissectors.manifest import Dissector
 from dissectors.questions import Question
 from dissectors.tracker import PASSING, Transaction, Verdict
+from sniff.analysis.holes import Holes
 from sniff.analysis.poll import UNASKED, Poll, PollKey
 from sniff.engine.engine import Output, Row
 from sniff.engine.session import LineEvent
@@ -51,12 +52,14 @@ class Asked(NamedTuple):
 
 
 class Polls:
-    """Takes what the engine gives. `dropped`: requests of entries beyond the limit; `version` changes with each."""
+    """Takes what the engine gives. `dropped`: requests of entries beyond the limit; `version` changes with each;
+    `holes`: when nobody heard what was asked."""
 
     def __init__(self, dissector: Dissector) -> None:
         self.dissector = dissector
         self.dropped = 0
         self.version = 0
+        self.holes = Holes()
         self.polls: dict[PollKey, Poll] = {}
         self.open: OrderedDict[int, Asked] = OrderedDict()  # by number of the row
         self._orphans: OrderedDict[int, Closed] = OrderedDict()  # by id; what closed and began before this part
@@ -72,6 +75,8 @@ class Polls:
     def add(self, output: Output) -> None:
         """Take rows and the transactions that closed with them."""
         for row in output.rows:
+            if row.searched is None:
+                self.holes.see(row.event.start, row.event.end)
             if asks(row):
                 assert isinstance(row.event, Frame)
                 assert row.placement is not None
@@ -89,7 +94,9 @@ class Polls:
         add_table(self, table)
 
     def add_line_event(self, event: LineEvent) -> None:
-        """It asks nothing."""
+        """Take what happened to the line: over a hole nothing is known."""
+        if event.kind.is_hole:
+            self.holes.miss(event)
 
     def remember(self, no: int, frame: Frame, source: int | None) -> None:
         """Take a frame that may ask something and whose transaction is open."""
@@ -121,7 +128,7 @@ class Polls:
         if poll is None:
             self.dropped += 1
             return
-        poll.add(closed.start, closed.attempt, closed.verdict, closed.latency, closed.request)
+        poll.add(closed.start, closed.attempt, closed.verdict, closed.latency, closed.request, self.holes)
         if closed.verdict is Verdict.NO_RESPONSE:
             self.miss(closed.id, key)
 
@@ -147,6 +154,7 @@ class Polls:
         """With the programme of a later stretch of the same bus, as a new value."""
         whole = Polls(self.dissector)
         whole.dropped = self.dropped + later.dropped
+        whole.holes = self.holes.merge(later.holes)
         whole.polls = {key: poll.merge(Poll(key)) for key, poll in self.polls.items()}
         whole.open, whole._missed = self.open.copy(), self._missed.copy()
         whole._orphans = self._orphans.copy()
@@ -159,7 +167,7 @@ class Polls:
             if mine is None:
                 whole.dropped += poll.asked + poll.repeats
             else:
-                whole.polls[key] = mine.merge(poll)
+                whole.polls[key] = mine.merge(poll, whole.holes)
         for tx, key in later._missed.items():
             whole.miss(tx, key)
         for closed in late:

@@ -146,6 +146,8 @@ class BusModel:
         self.version += 1
         self.summary.add_line_event(event)
         self.judging.add_line_event(event)
+        if self.reads_points:
+            self.polls.add_line_event(event)
 
     def lend(self) -> LineJudging:
         """What judges the line, which somebody else feeds until it is taken back (`two_processes.py`)."""

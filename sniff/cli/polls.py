@@ -54,11 +54,10 @@ def write(args: argparse.Namespace, polls: Polls, devices: Devices, session: Ses
     begin = min((poll.first for poll in held if poll.first is not None), default=0)
     end = max((poll.last for poll in held if poll.last is not None), default=0)
     clock = iso if args.style != "text" else _clock
+    turned = [told(changes(poll, begin, end, polls.holes), clock) if session.has_times else "" for poll in held]
     rows = [
-        _row(
-            poll, asked(poll, devices), told(changes(poll, begin, end), clock), args.style == "text", session.has_times
-        )
-        for poll in held
+        _row(poll, asked(poll, devices), words, args.style == "text", session.has_times)
+        for poll, words in zip(held, turned, strict=True)
     ]
     if args.style != "text":
         tables.write(HEADINGS, rows, args.style)

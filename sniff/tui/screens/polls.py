@@ -233,7 +233,7 @@ class PollsScreen(TableScreen):
         first, last = poll.first or 0, poll.last or 0
         words.append(f"{clock(first)} … {clock(last)}" if first != last else clock(first))
         begin, end = self._span()
-        turned = told(changes(poll, begin, end), lambda time: clock(time)[:8])
+        turned = told(changes(poll, begin, end, self.store.polls.holes), lambda time: clock(time)[:8])
         words += [turned] if turned else []
         chart = "" if self.size.height >= TALL else _chart(poll)
         return sanitized(" · ".join(words)) + (f"\nhow often  {chart}" if chart else "")

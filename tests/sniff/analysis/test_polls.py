@@ -26,7 +26,7 @@ from sniff.engine.bulk import tables
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import observe
-from sniff.engine.session import LineEvent, Session
+from sniff.engine.session import LineEvent, LineEventKind, Session
 from sniff.engine.table import Table
 from sniff.formats import read
 
@@ -132,6 +132,40 @@ def test_when_it_began_ended_and_changed() -> None:
     assert told([began], lambda time: f"{(time - BEGIN) // SECOND} s") == "began 300 s"
 
 
+def test_a_pause_is_one_and_no_slower_rate() -> None:
+    pdu = read_pdu(1, 0, 1)
+    (poll,) = programme(*bus([*every(100, 0, 300_000, pdu), *every(100, 900_050, 1_200_000, pdu)]))
+    paused, again = changes(poll, BEGIN, BEGIN + 1_200 * SECOND)
+    assert (paused.what, again.what) == (ChangeKind.PAUSED, ChangeKind.CHANGED)
+    assert again.interval is not None
+    assert abs(again.interval - SECOND // 10) < SECOND // 500
+
+
+@pytest.mark.parametrize("columns", [False, True])
+def test_what_nobody_heard_is_no_pause_and_no_interval(columns: bool) -> None:
+    pdu, seldom = read_pdu(1, 0, 1), read_pdu(2, 0, 1)
+    session, chunks = bus(
+        [
+            *every(100, 0, 300_000, pdu),
+            *every(100, 900_050, 1_200_000, pdu),
+            *every(20_000, 940_020, 1_200_000, seldom),
+        ]
+    )
+    at = next(place for place, chunk in enumerate(chunks) if chunk.time > BEGIN + 900 * SECOND)
+    items = [*chunks[:at], LineEvent(chunks[at].time, LineEventKind.OMITTED, "no trigger fired", 9), *chunks[at:]]
+    polls = Polls(dissector_for(session))
+    for item in tables(blocks_of(items), session) if columns else ():
+        polls.add_line_event(item) if isinstance(item, LineEvent) else polls.add_table(item)
+    observe(() if columns else outputs(items, session), polls)
+    one, other = sorted(polls, key=lambda poll: poll.key.station or 0)
+    assert one.every.most is not None
+    assert one.every.most < SECOND
+    end = BEGIN + 1_200 * SECOND
+    assert changes(one, BEGIN, end, polls.holes) == []
+    (began,) = changes(other, BEGIN, end, polls.holes)  # or in the hole, but seldom
+    assert (began.what, began.time - began.within) == (ChangeKind.BEGAN, polls.holes.begins[0])
+
+
 def test_what_comes_in_bursts_is_no_change() -> None:
     pdu = read_pdu(1, 0, 1)
     bursts = [one for begin in range(0, 600_000, 30_000) for one in every(500, begin, begin + 5000, pdu)]
@@ -177,6 +211,7 @@ def test_tables_say_the_same_wherever_they_are_cut(name: str, data: st.DataObjec
     polls = Polls(dissector_for(session))
     for table in whole:
         if isinstance(table, LineEvent):
+            polls.add_line_event(table)
             continue
         cuts = sorted(data.draw(st.lists(st.integers(0, len(table)), max_size=4)))
         for begin, end in zip([0, *cuts], [*cuts, len(table)], strict=True):
