@@ -11,6 +11,7 @@ from dissectors.line import MS, NS_PER_S, LineSettings
 from dissectors.words import duration
 from sniff.engine.session import Item, LineEvent, LineEventKind
 from sniff.formats.dump_rows import FILLED_UP, SAME_ROWS
+from sniff.formats.log_calendar import HOUR, Year, begins_summer
 from sniff.formats.log_clock import DAY, Stamp
 from sniff.formats.log_lines import Kind, Line, head_of
 from sniff.formats.log_packets import carried
@@ -54,6 +55,7 @@ class Assembly:
         self._day = 0
         self._date = 0  # of the line that told one last
         self._clock = -1
+        self._year = Year()
         self._held = bytearray()
         self._stamp: Stamp | None = None
         self._samples: tuple[int, int] | None = None
@@ -274,6 +276,9 @@ class Assembly:
             stamped = self._told(self._stamp)
             told = stamped + self._shift
             told = told if told < MOST else follows  # steps that add up to no time
+            if self._any and self._stamp.local and begins_summer(self._last - self._shift, stamped):
+                self._shift, told = self._shift - HOUR, told - HOUR
+                yield LineEvent(self._last, LineEventKind.CLOCK, "the log's clock goes ahead by an hour", HOUR)
             if self._shift_before is not None and self._last - SET_BACK <= stamped + self._shift_before < told:
                 told, self._shift = stamped + self._shift_before, self._shift_before  # a single line was wrong
                 self._shift_before = None
@@ -301,9 +306,10 @@ class Assembly:
             self._clock = max(self._clock, 0) + stamp.time
             return self._clock
         if not stamp.daily:
+            time = self._year.time_of(stamp) if stamp.yearly else stamp.time
             if stamp.dated:
-                self._date, self._clock = stamp.time // DAY * DAY - self._day * DAY, stamp.time % DAY
-            return stamp.time
+                self._date, self._clock = time // DAY * DAY - self._day * DAY, time % DAY
+            return time
         if self._clock >= 0 and stamp.time < self._clock - DAY // 2:
             self._day += 1
         self._clock = stamp.time

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from decimal import Decimal
@@ -26,7 +26,8 @@ DAY = 86_400 * NS_PER_S
 @dataclass(frozen=True, slots=True)
 class Stamp:
     """A time in a line. `time`: ns since the epoch (`dated`), since midnight or since the tool's start. `tick`: ns, the
-    finest that it tells. `begin`, `end`: where it stands.
+    finest that it tells. `begin`, `end`: where it stands. `local`: a date and time that says no zone. `yearly`: one
+    that says no year either, taken as of 1970; `leap_day`: it is the 29th of February, which is the 1st of March there.
     """
 
     time: int
@@ -37,6 +38,9 @@ class Stamp:
     daily: bool = False
     assumed: bool = False
     """Whether nobody said what its number counts."""
+    local: bool = False
+    yearly: bool = False
+    leap_day: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,9 +70,13 @@ def _dated(match: re.Match[str], order: Order | None) -> int:
 
 def _named_month(match: re.Match[str], _order: Order | None) -> int:
     found = match.groupdict()
-    year = int(found.get("year") or 1970)
-    month = _MONTHS.index(found["month"].lower()[:3]) + 1
-    return _midnight(year, month, int(found["day"])) + _of_day(match)
+    year, month, day = int(found.get("year") or 1970), _MONTHS.index(found["month"].lower()[:3]) + 1, int(found["day"])
+    return _midnight(year, *((3, 1) if _is_leap_day(found) else (month, day))) + _of_day(match)
+
+
+def _is_leap_day(found: Mapping[str, str | None]) -> bool:
+    """Whether a date without a year is one that only some have."""
+    return not found.get("year") and (found.get("month") or "").lower()[:3] == "feb" and found["day"] == "29"
 
 
 def _of_day(match: re.Match[str], _order: Order | None = None) -> int:
@@ -195,7 +203,19 @@ def stamp_of(line: str, times: Times = AS_WRITTEN) -> Stamp | None:
         assumed = not dated and (
             groups.get("said", "") is None or (groups.get("unit", "") or groups.get("unit_behind", "")) is None
         )
-        return Stamp(time, _tick(match, clock.unit), match.start(), match.end(), dated, clock.daily, assumed)
+        local, yearly = dated and "clock" in groups and not groups.get("zone"), dated and groups.get("year", "") is None
+        return Stamp(
+            time,
+            _tick(match, clock.unit),
+            match.start(),
+            match.end(),
+            dated,
+            clock.daily,
+            assumed,
+            local,
+            yearly,
+            yearly and _is_leap_day(groups),
+        )
     return _behind(line, times) if len(line) > _HEAD and not times.unit else None
 
 

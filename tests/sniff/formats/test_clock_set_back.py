@@ -36,6 +36,65 @@ def test_summer_ends(day: str, tmp_path: Path) -> None:
     assert {round(one.latency.nominal / MS) for one in closed if one.latency is not None} == {15}
 
 
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("2026-03-29 01:59", "2026-03-29 03:00"),
+        ("29-Mar-2026 01:59", "29-Mar-2026 03:00"),
+        ("10/04/2026 01:59", "10/04/2026 03:00"),
+    ],
+)
+def test_summer_begins(before: str, after: str, tmp_path: Path) -> None:
+    path = tmp_path / "night.log"
+    path.write_text(_polls(before, range(40, 60)) + _polls(after, range(20)))
+    items = list(read(path).items())
+    times = [item.time for item in items if isinstance(item, Chunk)]
+    assert times[-1] - times[0] == 39 * NS_PER_S + 20 * MS
+    (event,) = [item for item in items if isinstance(item, LineEvent)]
+    assert (event.kind, event.text) == (LineEventKind.CLOCK, "the log's clock goes ahead by an hour")
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("2026-03-30 01:59", "2026-03-30 03:00"),  # a Monday
+        ("2026-03-29 12:59", "2026-03-29 14:00"),
+        ("2026-03-29 01:59", "2026-03-29 03:30"),  # it was silent as well
+        ("2026-03-29T01:59", "2026-03-29T03:00"),
+    ],
+)
+def test_an_hour_of_silence_is_one(before: str, after: str, tmp_path: Path) -> None:
+    path = tmp_path / "night.log"
+    log = _polls(before, range(40, 60)) + _polls(after, range(20))
+    path.write_text(log.replace(".100 ", ".100Z ").replace(".120 ", ".120Z ") if "T" in before else log)
+    items = list(read(path).items())
+    times = [item.time for item in items if isinstance(item, Chunk)]
+    assert len(times) == len(items)
+    assert times[-1] - times[0] > 3600 * NS_PER_S
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [("Dec 31", "Jan  1"), ("Feb 28", "Feb 29"), ("Feb 29", "Mar  1"), ("Feb 28", "Mar  1"), ("Jan 31", "Feb  1")],
+)
+def test_days_without_a_year_follow_one_another(before: str, after: str, tmp_path: Path) -> None:
+    path = tmp_path / "syslog.log"
+    path.write_text(_polls(f"{before} 23:59", range(40, 60)) + _polls(f"{after} 00:00", range(20)))
+    items = list(read(path).items())
+    times = [item.time for item in items if isinstance(item, Chunk)]
+    assert len(times) == len(items)
+    assert times[-1] - times[0] == 39 * NS_PER_S + 20 * MS
+
+
+def test_a_log_of_several_years_goes_on(tmp_path: Path) -> None:
+    days = ["Feb 28", "Feb 29", "Mar 1", "Dec 31", "Jan 1", "Feb 28", "Mar 1", "Dec 31", "Jan 1"]
+    path = tmp_path / "syslog.log"
+    path.write_text("".join(_polls(f"{day} 12:00", range(3)) for day in days))
+    times = [item.time for item in read(path).items() if isinstance(item, Chunk)]
+    steps = [(later - earlier) // (86_400 * NS_PER_S) for earlier, later in zip(times[::6], times[6::6], strict=False)]
+    assert steps == [1, 1, 305, 1, 58, 1, 305, 1]
+
+
 def test_a_single_line_with_a_wrong_time(tmp_path: Path) -> None:
     path = tmp_path / "x.log"
     wrong = f"2026-10-25 01:00:00.000 {ASKED}\n"
