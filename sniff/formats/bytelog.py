@@ -19,8 +19,9 @@ from __future__ import annotations
 import codecs
 import csv
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from heapq import merge
 from itertools import islice, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
@@ -33,6 +34,7 @@ from sniff.engine.session import NO_TIMES, Adapter, Completeness, Item, LineEven
 from sniff.formats.contents import utf16_of
 from sniff.formats.files import explain, open_capture
 from sniff.formats.log_assembly import Assembly
+from sniff.formats.log_calendar import carried_on, turn
 from sniff.formats.log_lines import Kind
 from sniff.formats.log_margin import plain_signs
 from sniff.formats.log_pieces import lines_in, rows_in
@@ -225,13 +227,21 @@ class ByteLog:
                 self._counts.pass_over(at + rows.line_num)
         if order.is_newest_first:
             found.reverse()
+        turns: list[Item] = []
+        if table.daily or table.local:
+            times = carried_on([chunk.time for chunk in found], table.daily, table.local)
+            for at, (time, turned) in enumerate(times):
+                turns += [turn(found[at - 1].time, turned)] if turned else []
+                found[at] = found[at] if found[at].time == time else replace(found[at], time=time)
         first = min((chunk.time - len(chunk.octets) * char for chunk in found), default=0)
         if first < 0:  # counted from a trigger: no time is before 1970
             found = [replace(chunk, time=chunk.time - first) for chunk in found]
+        in_order: Iterable[Item] = sorted(
+            found, key=lambda chunk: chunk.time
+        )  # two lines of a bus come one after another
         if table.exact and table.duration is None:
-            yield from _one_after_another(found, char)
-        else:
-            yield from sorted(found, key=lambda chunk: chunk.time)  # two lines of a bus are listed one after the other
+            in_order = _one_after_another(found, char)
+        yield from merge(in_order, turns, key=lambda item: item.time)
 
 
 def _one_after_another(found: list[Chunk], char: int) -> Iterator[Chunk]:

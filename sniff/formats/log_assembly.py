@@ -8,10 +8,9 @@ from dataclasses import replace
 from dissectors.checksums import ends_with_crc16
 from dissectors.frame import Chunk
 from dissectors.line import MS, NS_PER_S, LineSettings
-from dissectors.words import duration
 from sniff.engine.session import Item, LineEvent, LineEventKind
 from sniff.formats.dump_rows import FILLED_UP, SAME_ROWS
-from sniff.formats.log_calendar import HOUR, Year, begins_summer
+from sniff.formats.log_calendar import HOUR, Year, begins_summer, turn
 from sniff.formats.log_clock import DAY, Stamp
 from sniff.formats.log_lines import Kind, Line, head_of
 from sniff.formats.log_packets import carried
@@ -278,17 +277,15 @@ class Assembly:
             told = told if told < MOST else follows  # steps that add up to no time
             if self._any and self._stamp.local and begins_summer(self._last - self._shift, stamped):
                 self._shift, told = self._shift - HOUR, told - HOUR
-                yield LineEvent(self._last, LineEventKind.CLOCK, "the log's clock goes ahead by an hour", HOUR)
+                yield turn(self._last, HOUR)
             if self._shift_before is not None and self._last - SET_BACK <= stamped + self._shift_before < told:
                 told, self._shift = stamped + self._shift_before, self._shift_before  # a single line was wrong
                 self._shift_before = None
             if self._any and told < self._last - SET_BACK:
-                back = self._last - told
+                back = turn(self._last, told - self._last)
                 self._shift_before, self._shift = self._shift, self._shift + follows - told
                 told = follows
-                yield LineEvent(
-                    self._last, LineEventKind.CLOCK, f"the log's clock goes back by {duration(back)}", -back
-                )
+                yield back
             is_coarse = self._stamp.tick >= COARSE or (told == self._last and self._any)
             time = told
             if is_coarse and self._any and told > self._last - _BACKWARDS:

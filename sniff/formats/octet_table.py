@@ -22,6 +22,7 @@ from decimal import Decimal, InvalidOperation
 from itertools import pairwise
 
 from dissectors.frame import Chunk, LineError, Mark
+from sniff.formats.log_calendar import calendar_of
 from sniff.formats.log_times import AS_WRITTEN, UNIT_NAMES, Times, is_count, order_of, unit_of
 from sniff.formats.table_cells import DIGITS, MOST, UNITS, fits, octets_of, spelling_of, tick_of, time_of
 
@@ -121,6 +122,9 @@ class TableLayout:
     """Where the day of the time stands."""
     tick: int = 1
     """ns: the place of the last digit that a time has."""
+    daily: bool = False
+    """Whether times are those of a day; `local`: whether they say a date and no zone."""
+    local: bool = False
 
     @property
     def exact(self) -> bool:
@@ -252,7 +256,7 @@ def heading_of(heading: str, delimiter: str, rows: Sequence[str]) -> TableLayout
     ticks = [tick for cell in data if (tick := tick_of(cell[when], unit, times)) is not None]
     return TableLayout(
         octet, read, delimiter, begin, end, place(DURATION), unit, kind, (*errors, *named), times, tail, other, day,
-        min(ticks) if len(ticks) >= FEW_TIMES else 1,
+        min(ticks) if len(ticks) >= FEW_TIMES else 1, *calendar_of([cell[when] for cell in data[:FEW_TIMES]], times),
     )  # fmt: skip
 
 

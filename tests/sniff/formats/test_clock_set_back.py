@@ -109,3 +109,41 @@ def test_lines_of_two_writers_are_no_clock_that_was_set(tmp_path: Path) -> None:
     path = tmp_path / "x.log"
     path.write_text(f"10:00:05.000 {ASKED}\n10:00:04.990 {ASKED}\n10:00:05.100 {ASKED}\n" * 1)
     assert all(isinstance(item, Chunk) for item in read(path).items())
+
+
+# --- tables ---
+
+
+def _rows(clock: str, seconds: range) -> str:
+    return "".join(f"{clock}:{at:02}.100,{ASKED}\n{clock}:{at:02}.120,{ANSWERED}\n" for at in seconds)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "told"),
+    [
+        ("23:59", "00:00", []),
+        ("2026-10-25 02:59", "2026-10-25 02:00", ["the log's clock goes back by 60.0 min"]),
+        ("2026-03-29 01:59", "2026-03-29 03:00", ["the log's clock goes ahead by an hour"]),
+        ("2026-03-28 23:59", "2026-03-29 00:00", []),
+    ],
+)
+@pytest.mark.parametrize("newest_first", [False, True])
+def test_rows_go_on(before: str, after: str, told: list[str], newest_first: bool, tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    rows = (_rows(before, range(40, 60)) + _rows(after, range(20))).splitlines()
+    path.write_text("\n".join(["time,data", *(rows[::-1] if newest_first else rows)]))
+    items = list(read(path).items())
+    chunks = [item for item in items if isinstance(item, Chunk)]
+    assert [chunk.octets[2] for chunk in chunks[:4]] == [0, 4, 0, 4]
+    assert chunks[-1].time - chunks[0].time == 39 * NS_PER_S + 20 * MS
+    assert [item.text for item in items if isinstance(item, LineEvent)] == told
+    assert [item.time for item in items] == sorted(item.time for item in items)
+
+
+def test_two_lists_of_one_time_are_put_together(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    both = [f"2026-10-26 02:{at:02}:00.000,{ASKED}" for at in range(60)]
+    both += [f"2026-10-26 02:{at:02}:00.020,{ANSWERED}" for at in range(60)]
+    path.write_text("\n".join(["time,data", *both]))
+    chunks = [item for item in read(path).items() if isinstance(item, Chunk)]
+    assert [chunk.octets[2] for chunk in chunks[:4]] == [0, 4, 0, 4]
