@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from sniff.filter.errors import FilterError
-from sniff.filter.literals import DAY, Instant
+from sniff.filter.literals import Instant
 
 if TYPE_CHECKING:
     import numpy as np
@@ -115,7 +115,7 @@ class Between:
 
 @dataclass(frozen=True, slots=True)
 class When:
-    """Times that compare so with an instant; equal is what lies within its step."""
+    """Times that compare so with an instant; equal is what lies within its step, before and after what does not."""
 
     operator: str
     wanted: Instant
@@ -131,18 +131,19 @@ class When:
 
     def _of(self, time: Any) -> Any:
         wanted = self.wanted
-        time = time % DAY if wanted.daily else time
+        time = wanted.of(time)
         if self.operator in ("==", "==="):
             return (time >= wanted.time) & (time < wanted.time + wanted.step)
         if self.operator in ("!=", "!=="):
             return (time < wanted.time) | (time >= wanted.time + wanted.step)
-        return COMPARE[self.operator](time, wanted.time)
+        last = wanted.time + wanted.step - 1
+        return COMPARE[self.operator](time, last if self.operator in ("<=", ">") else wanted.time)
 
     def of_all(self, least: int, most: int) -> bool | None:
         """What it says of all times from one to another, where that is the same."""
-        if self.wanted.daily and least // DAY != most // DAY:
+        shift = self.wanted.one_day(least, most)
+        if shift is None:
             return None
-        shift = least // DAY * DAY if self.wanted.daily else 0
         first, last = least - shift, most - shift
         begin, end = self.wanted.time, self.wanted.time + self.wanted.step
         if self.operator in ("==", "===", "!=", "!=="):
@@ -170,17 +171,22 @@ class During:
         return np.asarray(self._of(values), bool)
 
     def _of(self, time: Any) -> Any:
-        time = time % DAY if self.low.daily else time
+        time = self.low.of(time)
         if self.low.daily and self.high.time < self.low.time:
-            return (time >= self.low.time) | (time <= self.high.time)
-        return (time >= self.low.time) & (time <= self.high.time)
+            return (time >= self.low.time) | (time <= self._last)
+        return (time >= self.low.time) & (time <= self._last)
+
+    @property
+    def _last(self) -> int:
+        """ns; the last of the times that are equal to the second."""
+        return self.high.time + self.high.step - 1
 
     def of_all(self, least: int, most: int) -> bool | None:
         """What it says of all times from one to another, where that is the same."""
-        if self.low.daily and (least // DAY != most // DAY or self.high.time < self.low.time):
+        shift = self.low.one_day(least, most)
+        if shift is None or (self.low.daily and self.high.time < self.low.time):
             return None
-        shift = least // DAY * DAY if self.low.daily else 0
-        return Between(self.low.time, self.high.time).of_all(least - shift, most - shift)
+        return Between(self.low.time, self._last).of_all(least - shift, most - shift)
 
 
 @dataclass(frozen=True, slots=True)

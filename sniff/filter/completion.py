@@ -90,15 +90,16 @@ def written(value: object) -> str:
     return f'"{escaped}"'
 
 
-def shown_value(value: object, field: Expression) -> str:
-    """A value of a row as it is written in a filter."""
+def shown_value(value: object, field: Expression, zone: Callable[[int], int] | None = None) -> str:
+    """A value of a row as it is written in a filter. `zone`: as a scope has it."""
     type = field.type
     if isinstance(value, bytes):
         return value.hex(":") or '""'
     if type.kind is Kind.DURATION and isinstance(value, int):
         return f"{exact_duration(value, MS)}ms"
     if type.kind is Kind.TIME and isinstance(value, int):
-        return f'"{datetime.fromtimestamp(value // 1_000_000_000, UTC):%H:%M:%S}"'
+        local = value if zone is None else value + zone(value)
+        return f'"{datetime.fromtimestamp(local // 1_000_000_000, UTC):%H:%M:%S}"'
     word = next((word for word, number in type.words.items() if number == value), None)
     return written(value if word is None or type.kind is Kind.TRUTH else word)
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from decimal import Decimal, InvalidOperation
+from typing import Any
 
 from dissectors.field_types import FieldType, Kind, plain_word
 from sniff.filter.errors import FilterError, nearest
@@ -41,11 +42,32 @@ _MOST_NUMBER = 40
 @dataclass(frozen=True, slots=True)
 class Instant:
     """A time as it was written: `time` ns since the epoch, or since midnight where `daily`; anything within `step` ns
-    behind it is the same time."""
+    behind it is the same time. `zoned`: a zone stands beside it. `east`: ns by which clocks are ahead of UTC, of a time
+    of day."""
 
     time: int
     step: int
     daily: bool = False
+    zoned: bool = False
+    east: int = 0
+
+    def local(self, zone: Callable[[int], int], started: int) -> Instant:
+        """The same as the clocks of people have it. `zone`: by how many ns they are ahead of UTC at a time; `started`:
+        when, for times of day."""
+        if self.daily:
+            return replace(self, east=zone(started))
+        return self if self.zoned else replace(self, time=self.time - zone(self.time - zone(self.time)))
+
+    def of(self, time: Any) -> Any:
+        """Times as this one is to be compared with: of every day, where it is one of a day."""
+        return (time + self.east) % DAY if self.daily else time
+
+    def one_day(self, least: int, most: int) -> int | None:
+        """What is to be taken from all times from one to another; None where they are of several days."""
+        if not self.daily:
+            return 0
+        day = (least + self.east) // DAY
+        return day * DAY - self.east if day == (most + self.east) // DAY else None
 
 
 def value_of(
@@ -162,7 +184,7 @@ def instant(written: Literal, name: str) -> Instant:
             inner = _CLOCK.fullmatch(date[4])
             assert inner is not None
             time, step = _clock(inner)
-            return Instant(begin + time - _zone(date[5]), step)
+            return Instant(begin + time - _zone(date[5]), step, zoned=date[5] is not None)
     except ValueError:
         pass
     raise FilterError(

@@ -30,7 +30,8 @@ class Scope:
     come in order. `told`: the values of points that a row carries, by its number; None where nobody knows them.
     `telling`: which of so many rows from a number on carry any; None where that is not known beforehand. `says`: the
     line that says what a row is, where that knows more than the row. `answered`: fields of an answer that only its
-    request tells. `has_times`: whether the capture says when anything came.
+    request tells. `has_times`: whether the capture says when anything came. `zone`: by how many ns the clocks of people
+    are ahead of UTC at a time, where times are shown to them so; None: written times are UTC.
     """
 
     started: int | None = None
@@ -43,6 +44,7 @@ class Scope:
     says: Callable[[Row], str] | None = None
     answered: Callable[[Row], Mapping[str, int | float | str]] | None = None
     has_times: bool = True
+    zone: Callable[[int], int] | None = None
 
     def stations(self) -> dict[str, tuple[int, ...]]:
         """Addresses by name."""

@@ -59,6 +59,9 @@ class Values:
         found = value_of(written, left.type, left.words, self.names.stations, left.spelled)
         for one in found:
             check_range(left, one, written)
+        zone, started = self.names.scope.zone, self.names.scope.started or 0
+        if zone is not None:
+            return tuple(one.local(zone, started) if isinstance(one, Instant) else one for one in found)
         return found
 
     def prefers_word(self, left: Expression, written: Value) -> bool:

@@ -93,6 +93,12 @@ def size(octets: int) -> str:
     return f"{value:.0f} {unit}" if unit == "B" or value >= 99.95 else f"{value:.1f} {unit}"
 
 
+def ahead_of_utc(time: int) -> int:
+    """By how many ns the clocks of this machine's zone are ahead of UTC at a time, ns."""
+    ahead = _local(time).utcoffset()
+    return 0 if ahead is None else int(ahead.total_seconds()) * NS_PER_S
+
+
 def _local(time: int) -> datetime:
     """Local time; times that no calendar has are shown as the epoch's."""
     try:

@@ -19,7 +19,7 @@ from sniff.filter.compiling import field_of
 from sniff.filter.completion import shown_value
 from sniff.filter.errors import OfOthers, OfTimes
 from sniff.filter.told import told
-from sniff.tui.times import TimeMode
+from sniff.tui.times import TimeMode, ahead_of_utc
 
 COUNTED = 2000
 """Rows around the cursor whose values are counted."""
@@ -122,7 +122,8 @@ class Viewing:
         for no in range(first, min(first + COUNTED, self.last_row + 1)):
             row = self.store.by_no(no)
             if row is not None:
-                counted.update({shown_value(value, field_) for value in field_.get(row, self.store.transaction(row))})
+                values = field_.get(row, self.store.transaction(row))
+                counted.update({shown_value(value, field_, ahead_of_utc) for value in values})
         return counted.most_common(MOST_FILTERS)
 
     def _scope(self, text: str) -> Scope:
@@ -143,6 +144,7 @@ class Viewing:
             says=store.text,
             answered=store.answered,
             has_times=store.session.has_times,
+            zone=ahead_of_utc,  # as the lists show times
         )
 
     def _begin_of(self, no: int) -> int | None:

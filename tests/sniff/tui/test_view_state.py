@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 from sniff.bus.rows import Store
 from sniff.engine.session import NO_TIMES, LineEvent, LineEventKind
 from sniff.filter import FilterError
+from sniff.tui.times import clock
 from sniff.tui.view_state import Viewing
 
 
@@ -34,6 +36,19 @@ def test_a_filter_of_time_where_nothing_has_any(busy_bus: Any) -> None:
         viewing.set_filter('frame.time > "10:02"')
     viewing.colour_rules({"red": "latency_ms > 5ms"})  # a saved one is for other captures, too
     assert viewing.colour_of(busy_bus.store.by_no(1), None) == ""
+
+
+def test_times_are_those_that_the_lists_show(busy_bus: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TZ", "XST-5:30")
+    time.tzset()
+    viewing, begin = Viewing(busy_bus.store), busy_bus.store.by_no(1).event.start
+    assert clock(begin) == "15:30:00.000"
+    for text in ('frame.time == "15:30:00.000"', 'frame.time == "2026-03-01 15:30:00.000"'):
+        viewing.set_filter(text)
+        assert [no for no in range(1, 14) if viewing.accepts_row(no)] == [1]
+    assert ('"15:30:00"', 13) in viewing.counts("frame.time")
+    viewing.set_filter('frame.time == "2026-03-01T10:00:00.000Z"')
+    assert viewing.accepts_row(1)
 
 
 def test_marks_go_round(busy_bus: Any) -> None:
