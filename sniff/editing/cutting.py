@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 _SECONDS = re.compile(r"\+?(\d+(?:\.\d{1,9})?) ?(ms|s|m|min|h)?")
 _UNITS = {"ms": 10**6, None: NS_PER_S, "s": NS_PER_S, "m": 60 * NS_PER_S, "min": 60 * NS_PER_S, "h": 3600 * NS_PER_S}
 _CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2})(?:\.(\d{1,9}))?)?")
+_FRACTION = re.compile(r":\d\d[.,](\d+)|[T ]\d{6}[.,](\d+)")
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _DAY = 24 * 3600 * NS_PER_S
 _FRAMES = re.compile(r"(\d+)?(?:[-–:](\d+)?)?")
 
@@ -59,8 +61,10 @@ def parse_time(text: str, session: Session) -> int:
         raise ValueError(
             f"time {text!r}: expected seconds from the start (+12.5), 10:00:12.5 (UTC) or 2026-03-01T10:00:12.5Z"
         ) from None
-    whole = moment.timestamp() if moment.tzinfo is not None else moment.replace(tzinfo=UTC).timestamp()
-    return int(whole) * NS_PER_S + moment.microsecond * 1000
+    known = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
+    whole = (known.replace(microsecond=0) - _EPOCH) // timedelta(seconds=1)  # no float: those before 1970 round up
+    told = _FRACTION.search(text)
+    return whole * NS_PER_S + int((told[1] or told[2] if told is not None else "")[:9].ljust(9, "0"))
 
 
 def _of_day(clock: re.Match[str], start: int) -> int:

@@ -344,6 +344,21 @@ def test_times_as_people_write_them(text: str, after: float) -> None:
     assert parse_time(text, session) - session.started == round(after * 10**9)
 
 
+@pytest.mark.parametrize(
+    ("text", "time"),
+    [
+        ("2026-03-01T10:00:03.766123456Z", 1_772_359_203_766_123_456),  # as `show --json` has it
+        ("2026-03-01T12:00:03,766123456+02:00", 1_772_359_203_766_123_456),
+        ("20260301T100003.766123456Z", 1_772_359_203_766_123_456),
+        ("2026-03-01 10:00:03", 1_772_359_203_000_000_000),
+        ("1969-12-31T23:59:59.5Z", -500_000_000),
+        ("1969-12-31", -86_400_000_000_000),
+    ],
+)
+def test_a_date_and_time_is_exact(text: str, time: int) -> None:
+    assert parse_time(text, Session("x", LineSettings.parse("19200,8E1"), "modbus-rtu")) == time
+
+
 @pytest.mark.parametrize("text", ["24:00", "10:60", "noon", "-3", "10 parsecs"])
 def test_what_is_no_time(text: str) -> None:
     with pytest.raises(ValueError, match=r"expected seconds from the start \(\+12.5\)"):
