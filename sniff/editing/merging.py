@@ -31,8 +31,14 @@ def merged_session(captures: Sequence[Capture], names: Sequence[str]) -> Session
                 f"{name}: {other.protocol} {other.line}, but {names[0]} is {first.protocol} {first.line}; "
                 "captures of one bus with the same settings can be merged"
             )
-    worst = max((capture.session.adapter for capture in captures), key=lambda adapter: adapter.latency)
-    return replace(first, started=min(capture.session.started for capture in captures), adapter=worst)
+    worst = max((capture.session for capture in captures), key=lambda session: session.adapter.latency)
+    return replace(
+        first,
+        started=min(capture.session.started for capture in captures),
+        adapter=worst.adapter,
+        said=worst.said,  # with its own reads: those of another would speak for a better one
+        reads=worst.reads,
+    )
 
 
 class Merged:

@@ -16,8 +16,8 @@ from sniff.bus.capture_writer import create
 from sniff.bus.offline import settled
 from sniff.editing.anonymising import anonymised, anonymous_session
 from sniff.editing.cutting import parse_time
-from sniff.editing.merging import merged
-from sniff.engine.session import Item, LineEvent, Session
+from sniff.editing.merging import merged, merged_session
+from sniff.engine.session import Item, LineEvent, Session, with_settings
 from sniff.formats import read
 from sniff.formats.text import parse
 from sniff.simulation.scenarios import scenario, simulate
@@ -196,6 +196,20 @@ def test_a_cut_that_means_nothing_is_explained(
     code, _, err = sniff485("cut", OURS / "rtu-usual-faults.cap.txt", "-o", tmp_path / "x.mcap", *arguments)
     assert code == 2
     assert said in err
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_worst_adapter_stays_the_worst_in_any_order(turned: bool, tmp_path: Path) -> None:
+    """Where the other one is inferred from its reads, which are coarse here."""
+    head = "#!sniff-capture 1\n# line: 19200,8E1\n# protocol: modbus-rtu\n# start: 2026-03-01T10:00:00Z\n"
+    reads = "+20 01 03 00 00 00 02 C4 0B\n" * 20
+    paths = [tmp_path / "coarse.cap.txt", tmp_path / "told.cap.txt"]
+    for path, told in zip(paths, ("", "# latency: 50\n# latency-from: told\n"), strict=True):
+        path.write_text(head + told + reads)
+    captures = [read(path) for path in (paths[::-1] if turned else paths)]
+    assert sorted(capture.session.adapter.latency for capture in captures) == [1_000_000, 50_000_000]
+    session = with_settings(merged_session(captures, ["one", "other"]))
+    assert (session.adapter.latency, session.adapter.latency_from) == (50_000_000, "told")
 
 
 def test_captures_of_different_buses_are_not_merged(
