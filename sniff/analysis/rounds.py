@@ -35,8 +35,12 @@ class _Round:
     count: int = 0
     squares: int = 0
 
-    def again(self, start: int) -> None:
-        """It came once more."""
+    def again(self, start: int, hole: int | None) -> None:
+        """It came once more. `hole`: ns, of the latest; over it there is no interval."""
+        if hole is not None and self.last < hole <= start:
+            self.first += start - self.last
+            self.last = start
+            return
         self.count += 1
         self.squares += ((start - self.last) // MS) ** 2
         self.last = start
@@ -55,12 +59,17 @@ class Rounds:
     def __init__(self) -> None:
         self._rounds: dict[bytes, _Round] = {}
         self._by_mark: dict[int, _Round] = {}  # the same, as far as columns have asked
+        self._hole: int | None = None
+
+    def miss(self, time: int) -> None:
+        """Octets may be lost at `time`, ns. Rows that it ended may still come."""
+        self._hole = time
 
     def see(self, octets: bytes, start: int) -> None:
         """Take a frame. `start`: ns."""
         known = self._rounds.get(octets)
         if known is not None:
-            known.again(start)
+            known.again(start, self._hole)
         elif len(self._rounds) < MOST_ROUNDS:
             self._rounds[octets] = _Round(start, start)
 
@@ -100,6 +109,10 @@ class Rounds:
             one = self._rounds.get(octets)
             if times > 1 and one is not None:
                 starts = frames.start[order[int(begins[group]) : int(ends[group])]]
+                if self._hole is not None and one.last < self._hole <= int(starts[-1]):  # rows before it and behind it
+                    for start in starts[1:].tolist():
+                        one.again(start, self._hole)
+                    continue
                 one.count += times - 1
                 one.squares += int((((starts[1:] - starts[:-1]) // MS) ** 2).sum())
                 one.last = int(frames.start[lasts[group]])

@@ -199,6 +199,7 @@ class TimePatterns:
         """Take something that happened to the line: over a hole nothing is known."""
         if event.kind.is_hole:
             self._silences.miss(event.time)
+            self._rounds.miss(event.time)
 
     def _step(self, moment: int, is_trouble: bool) -> bool:
         """Measure a moment against the trouble before it; whether it is one of its own."""
