@@ -164,8 +164,9 @@ class Ring:
 
     `frames`, `octets`, `noise` (octets), `header_errors`, `data_errors`, `cut`: counts.
     `poll_waste`: time spent on polls that nobody answered, waiting included. `impossible`: frames that followed the one
-    before sooner than any driver can (Tturnaround). `hole`: ns, when octets may have been missed last. `polled`: when
-    one station polled another last, ns. `happened`: events by kind and station.
+    before sooner than any driver can (Tturnaround). `hole`: ns, when octets may have been missed last; `unheard`: for
+    how long nobody listened in all. `polled`: when one station polled another last, ns. `happened`: events by kind and
+    station.
     """
 
     timing: Timing = field(default_factory=Timing)
@@ -180,6 +181,7 @@ class Ring:
     poll_waste: int = 0
     impossible: int = 0
     hole: int = 0
+    unheard: int = 0
     nodes: Mapping[int, RingNode] = field(default_factory=lambda: MappingProxyType({}))
     edges: Mapping[tuple[int, int], Edge] = field(default_factory=lambda: MappingProxyType({}))
     happened: Mapping[tuple[RingEventKind, int | None], Happened] = field(default_factory=lambda: MappingProxyType({}))
@@ -192,8 +194,8 @@ class Ring:
 
     @property
     def span(self) -> int:
-        """From the first octet to the last, ns."""
-        return 0 if self.first is None or self.last is None else self.last - self.first
+        """From the first octet to the last, without what nobody heard, ns."""
+        return 0 if self.first is None or self.last is None else max(0, self.last - self.first - self.unheard)
 
     @property
     def busy(self) -> int:
@@ -303,6 +305,7 @@ class Ring:
             self.poll_waste + other.poll_waste,
             self.impossible + other.impossible,
             max(self.hole, other.hole, *firsts, 0) if self.frames and other.frames else max(self.hole, other.hole),
+            self.unheard + other.unheard,
             MappingProxyType(nodes),
             MappingProxyType(edges),
             MappingProxyType(happened),

@@ -59,7 +59,10 @@ class MstpRingObserver(TokenWatch):
         Noise without octets is a hole: nobody listened for a while, and nothing is concluded from the silence.
         """
         tally = self._tally
-        if self._missed is not None and (event.end >= self._missed or self._silence(event) >= T_NO_TOKEN):
+        is_missed = self._missed is not None and (event.end >= self._missed or self._silence(event) >= T_NO_TOKEN)
+        if tally.first is not None and (is_missed or not event.octets):
+            tally.unheard += max(0, event.start - tally.last)
+        if is_missed:
             self._see_hole(event.start)
         if tally.first is None:
             tally.first, tally.last = event.start, event.end

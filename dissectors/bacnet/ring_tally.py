@@ -108,6 +108,7 @@ class RingTally:
     poll_waste: int = 0
     impossible: int = 0
     hole: int = 0
+    unheard: int = 0
     nodes: dict[int, NodeTally] = field(default_factory=dict)
     edges: dict[tuple[int, int], EdgeTally] = field(default_factory=dict)
     happened: dict[tuple[RingEventKind, int | None], Happened] = field(default_factory=dict)
@@ -169,6 +170,7 @@ class RingTally:
             self.poll_waste,
             self.impossible,
             self.hole,
+            self.unheard,
             MappingProxyType({mac: node.value() for mac, node in sorted(self.nodes.items())}),
             MappingProxyType(
                 {

@@ -74,6 +74,7 @@ class Again:
 class BusRecord:
     """What was seen on the bus. Times are ns.
 
+    `unlistened`: how long nobody listened between `first` and `now`.
     `hasty`: requests after another that nothing had followed. `broken_in`: the same of damaged frames that begin as a
     request to another station. `too_many`: whether there were more such than are kept. `close`, `paused`: by sender; of
     the first the first ones, (time, frame before, frame), `close_ever`: all. `odd_ends`: ASCII frames that do not end
@@ -95,6 +96,7 @@ class BusRecord:
     timing: Timing
     first: int | None = None
     now: int = 0
+    unlistened: int = 0
     rhythm: Rhythm = field(default_factory=Rhythm)
     requests: int = 0
     answers: int = 0
@@ -138,10 +140,17 @@ class BusRecord:
     maker_words: Callable[[int, int], str] = _no_words
     has_numbers: Callable[[int], bool] = _unknown
 
+    def begin_anew(self, missed: int) -> None:
+        """Nobody listened for so many ns: what comes next is measured against nothing before."""
+        self.unlistened += missed
+        self.cycles.begin_anew()
+        for station in self.stations.values():
+            station.last_start = None
+
     @property
     def span(self) -> int:
-        """From the first octet to the last, ns; at least 1."""
-        return max(1, self.now - (self.first or 0))
+        """From the first octet to the last, without what nobody heard, ns; at least 1."""
+        return max(1, self.now - (self.first or 0) - self.unlistened)
 
     @property
     def judges_pauses(self) -> bool:

@@ -38,6 +38,8 @@ class RowObserver(Remembered):
         """See `dissectors.findings.Judge`."""
         seen = self.seen
         gap = event.start - seen.now
+        if not event.octets and seen.first is not None:  # nobody heard what was before it
+            seen.begin_anew(max(0, gap))
         seen.first = event.start if seen.first is None else seen.first
         seen.now = max(seen.now, event.end)
         if self._is_cut_echo(no, event):

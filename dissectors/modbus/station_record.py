@@ -289,6 +289,10 @@ class StationRecord:
             self.silent = Tally()
 
 
+_FAR = 1 << 63
+"""ns; no time is behind it."""
+
+
 @dataclass(slots=True)
 class Cycles:
     """Time from a request to the same request again, of the most frequent ones, and which of them follow which."""
@@ -297,6 +301,10 @@ class Cycles:
     _keys: dict[bytes, Key] = field(default_factory=dict)
     _periods: dict[bytes, deque[int]] = field(default_factory=dict)
     order: PollOrder = field(default_factory=PollOrder)
+
+    def begin_anew(self) -> None:
+        """No period goes on from what was seen so far."""
+        self._last = dict.fromkeys(self._last, _FAR)
 
     def add(self, octets: bytes, key: Key, start: int) -> None:
         """Take a request (unit and PDU) that is no repeat of an unanswered one."""

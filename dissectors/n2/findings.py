@@ -56,6 +56,7 @@ class N2Findings:
         self._timing = timing
         self.first: int | None = None
         self.now = 0
+        self._unheard = 0  # ns before it
         self.stations: dict[int, N2StationRecord] = {}
         self.master = Damages()
         self._asked: dict[int, OpenCommand] = {}  # by transaction
@@ -80,6 +81,10 @@ class N2Findings:
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
         """Take the next row: event, its header and placement (None for noise)."""
+        if not event.octets and self.first is not None:  # nobody heard what was before it
+            self._unheard += max(0, event.start - self.now)
+            for station in self.stations.values():
+                station.overrides.clear()  # they may have been released
         self.first = event.start if self.first is None else self.first
         self.now = max(self.now, event.end)
         self.newest = event.start
@@ -234,7 +239,7 @@ class N2Findings:
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far: the bus first, then station by station."""
-        span = self.now - (self.first or 0)
+        span = self.now - (self.first or 0) - self._unheard
         masters, clocked = self.masters, self.clocked.rhythm.is_by_the_clock
         heard = N2Evidence(self.now, span, self.master, self.stations, masters, self._stray, self.strikes, clocked)
         found = (reaching(one, self.late_speakers) if one.code == "N2011" else one for one in worded(heard))

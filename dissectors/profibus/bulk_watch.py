@@ -46,7 +46,12 @@ class BulkBusWatch(BusWatch):
 
     def is_calm(self, rows: RowColumns, units: Units, begin: int) -> bool:
         """Whether nothing is known that makes more of regular units from `begin` on than they say themselves."""
-        if self._asked is not None or self._robbed is not None or self._interruption is not None:
+        if (
+            self._missed is not None
+            or self._asked is not None
+            or self._robbed is not None
+            or self._interruption is not None
+        ):
             return False
         if self._holder not in (None, int(units.source[begin])):
             return False

@@ -57,8 +57,9 @@ class SlaveRow:
 
 @dataclass(frozen=True, slots=True)
 class Ring:
-    """`first`, `last`: ns, of what was seen. `wasted`: ns spent on polls that nobody answered. `has_times`: whether the
-    capture says when anything came; else all times are those of octets laid one behind the other."""
+    """`first`, `last`: ns, of what was seen, but for `unheard` ns between. `wasted`: ns spent on polls that nobody
+    answered. `has_times`: whether the capture says when anything came; else all times are those of octets laid one
+    behind the other."""
 
     masters: Mapping[int, MasterView] = field(default_factory=dict)
     slaves: Mapping[int, SlaveRow] = field(default_factory=dict)
@@ -66,11 +67,12 @@ class Ring:
     last: int = 0
     wasted: int = 0
     has_times: bool = True
+    unheard: int = 0
 
     @property
     def span(self) -> int:
         """ns that were watched."""
-        return self.last - self.first
+        return self.last - self.first - self.unheard
 
     @property
     def order(self) -> tuple[int, ...]:

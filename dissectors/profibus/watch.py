@@ -114,6 +114,8 @@ class BusWatch:
         self._tell = tell
         self._first: int | None = None
         self._last = 0
+        self._unheard = 0
+        self._missed: int | None = None  # where octets may be lost, until an event ends there or later
         self._wasted = 0
         self._looked: Ring | None = None
         self._heard = self._slack = 0  # end of the row before, and by how much it may have been earlier
@@ -131,7 +133,10 @@ class BusWatch:
         self._asked: tuple[Telegram, Service, int] | None = None  # an open request and its end
 
     def see(self, no: int, event: Event, header: Header | None) -> None:
-        """Take the next row."""
+        """Take the next row; one without octets: nobody heard what was before it."""
+        if self._first is not None and (not event.octets or (self._missed is not None and event.end >= self._missed)):
+            self._unheard += max(0, event.start - self._last)
+            self._missed = None
         self._first = event.start if self._first is None else self._first
         self._see(no, event, header)
         self._last = max(self._last, event.end)
@@ -139,7 +144,7 @@ class BusWatch:
 
     def _see(self, no: int, event: Event, header: Header | None) -> None:
         if not isinstance(event, Frame) or header is None or not event.ok:
-            self.miss(event.end)
+            self._forget()
             return
         telegram = parse(event.octets)
         if telegram.is_token:
@@ -150,7 +155,12 @@ class BusWatch:
             self._answer(no, telegram, event)
 
     def miss(self, time: int) -> None:
-        """Octets were lost or damaged: what is missing there says nothing."""
+        """Octets were lost at `time`, ns: what is missing there says nothing."""
+        self._missed = time
+        self._forget()
+
+    def _forget(self) -> None:
+        """Octets were lost or damaged."""
         if self._asked is not None and self._asked[0].destination in self.slaves:
             slave = self.slaves[self._asked[0].destination]
             slave.illegal += 1
@@ -203,7 +213,7 @@ class BusWatch:
             for address, view in self.slaves.items()
             if view.state is not None
         }
-        return Ring(masters, slaves, self._first or 0, self._last, self._wasted, self._timing.has_times)
+        return Ring(masters, slaves, self._first or 0, self._last, self._wasted, self._timing.has_times, self._unheard)
 
     def window(self) -> RingWindow:
         """What is new since this was called the last time; the first time is not told of."""

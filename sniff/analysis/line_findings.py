@@ -414,7 +414,7 @@ class LineFindings:
 
     def _note_if(self, count: int, of: int) -> Severity | None:
         """A note where so few are not worth a warning."""
-        return Severity.NOTE if is_rare(count, of, self._now - self._first) else None
+        return Severity.NOTE if is_rare(count, of, self._use.heard) else None
 
 
 def _sender(row: Row, nouns: Callable[[str], str]) -> str:

@@ -145,7 +145,7 @@ class LineUse:
         noted, full = self._most[SHORT], self._most[LONG]
         if noted >= BUSY or full >= FULL:
             span = LONG if full >= FULL else SHORT
-            average = min(1.0, self._busy / self._heard)
+            average = min(1.0, self._busy / self.heard)
             most = min(1.0, self._most[span])
             seen = f"octets on the line in {most:.0%} of {span} s at the busiest, {average:.0%} of all time"
             is_sure = full >= FULL and not self._is_assumed and self._most[span] <= MORE_THAN_ALL
@@ -159,9 +159,9 @@ class LineUse:
             )
             yield told if self._most[span] <= MORE_THAN_ALL else self._too_many(told, span)
         share = self._broadcast_busy / self._busy if self._busy else 0.0
-        of_time = self._broadcast_busy / self._heard
+        of_time = self._broadcast_busy / self.heard
         if self._broadcast.count >= BROADCASTS_LEAST and share >= BROADCASTS_NOTED and of_time >= BROADCASTS_FELT:
-            rate = self._broadcast.count * NS_PER_S / self._heard
+            rate = self._broadcast.count * NS_PER_S / self.heard
             seen = f"{self._broadcast.count} broadcasts, {share:.0%} of all octets"
             seen += "" if self._is_assumed else f", {of_time:.0%} of all time"
             is_costly = BROADCASTS_TOO_MANY <= share < ONLY_BROADCASTS and of_time >= BROADCASTS_COSTLY
@@ -169,7 +169,7 @@ class LineUse:
             yield self._broadcast.found(RULES["LN402"], "bus", f"{seen}, {rate:.1f} a second", severity)
 
     @property
-    def _heard(self) -> int:
+    def heard(self) -> int:
         """ns from the first octet to the last without the holes; at least 1."""
         return max(1, self._last - (self._first or 0) - self._holes.total)
 
