@@ -36,6 +36,7 @@ from dissectors.subject import About
 from dissectors.tracker import Verdict
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
+from sniff.engine.session import LineEventKind
 
 LOOKED_FOR = 3
 """So many requests to an address that never answers are a look whether anybody is there."""
@@ -66,6 +67,7 @@ class _Beyond:
     def of(cls, summary: Summary, nodes: Iterable[Node]) -> _Beyond:
         """The same for all senders: a hole has no favourite."""
         holes = sum(count for kind, count in summary.events.items() if kind.is_hole)
+        holes -= min(summary.events[LineEventKind.UNPLUGGED], summary.events[LineEventKind.REPLUGGED])  # one hole
         counts = summary.damaged, summary.verdicts[Verdict.DAMAGED_ANSWER], sum(node.unanswered for node in nodes)
         return cls(*(max(0, count - holes) / count if count else 1.0 for count in counts))
 

@@ -121,6 +121,10 @@ def test_what_holes_explain_is_nobodys() -> None:
     made.events[LineEventKind.DROPPED] = 5
     half = health_of(made)
     assert half.stations[1].reasons == ("8.0% of its answers damaged (−24)",)  # 16 % are, half of them at holes
+    made.events[LineEventKind.DROPPED] = 3
+    made.events[LineEventKind.UNPLUGGED] = made.events[LineEventKind.REPLUGGED] = 2  # gone and back is one hole
+    assert health_of(made) == half
+    made.events.clear()
     made.events[LineEventKind.DROPPED] = 10
     health = health_of(made)
     assert (health.bus, {one.score for one in health.stations.values()}) == (health_of(summary(node(1, 50))).bus, {100})
