@@ -8,7 +8,7 @@ headings (`octet_table.py`).
 Neither line settings nor protocol are in such a file. Times of logs are those of another program, taken as the end of
 the last octet of a line; `FOREIGN_LATENCY` is assumed, or what the clock of the log leaves open if that is more. Where
 there are no times, or times to the second, octets are back to back with LINE_END after each line: the line is a limit
-of a frame, but not one that could not be doubted. Exact are tables that have the begin of each octet.
+of a frame, but not one that could not be doubted. Exact are tables that have the begin of each octet, one in a row.
 
 Lines of other text are passed over. Lines that look like octets and are not understood are counted, and too many of
 them are an error, raised when all that was understood has been given.
@@ -107,7 +107,7 @@ class ByteLog:
         if self._heading is not None:
             table = self._heading[1]
             exact = Adapter("logic analyser", latency_from="exact times")
-            adapter = _as_coarse(exact if table.exact else adapter, table.tick)
+            adapter = _as_coarse(exact if table.is_measured else adapter, table.tick)
         elif self._plan is not None:
             adapter = self._adapter(lines, adapter)
         self.session = replace(session, started=first.time if first is not None else 0, adapter=adapter)

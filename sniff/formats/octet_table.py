@@ -122,14 +122,21 @@ class TableLayout:
     """Where the day of the time stands."""
     tick: int = 1
     """ns: the place of the last digit that a time has."""
+    octetwise: bool = False
+    """Whether rows hold an octet each."""
     daily: bool = False
     """Whether times are those of a day; `local`: whether they say a date and no zone."""
     local: bool = False
 
     @property
     def exact(self) -> bool:
-        """Whether the time of each octet is measured on the line: both its ends, or its begin."""
+        """Whether rows say when they began on the line: both ends, or the begin."""
         return self.begin is not None
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether the time of each octet is measured on the line; of rows that are frames nobody knows by what."""
+        return self.exact and self.octetwise
 
     def holds(self, row: Sequence[str]) -> bool:
         """Whether a row is of a type that holds octets."""
@@ -252,11 +259,13 @@ def heading_of(heading: str, delimiter: str, rows: Sequence[str]) -> TableLayout
     other = names.index(partners[0]) if partners else None
     told = [[one for one in cell[octet:] if one] if tail else [_either(cell, octet, other)] for cell in data]
     read = spelling_of([one for cell in told for one in cell])
-    unit, times = _times_of([cell[when] for cell in data], [_length(cell, read) for cell in told], units[when])
+    lengths = [_length(cell, read) for cell in told]
+    unit, times = _times_of([cell[when] for cell in data], lengths, units[when])
     ticks = [tick for cell in data if (tick := tick_of(cell[when], unit, times)) is not None]
     return TableLayout(
         octet, read, delimiter, begin, end, place(DURATION), unit, kind, (*errors, *named), times, tail, other, day,
-        min(ticks) if len(ticks) >= FEW_TIMES else 1, *calendar_of([cell[when] for cell in data[:FEW_TIMES]], times),
+        min(ticks) if len(ticks) >= FEW_TIMES else 1, 10 * lengths.count(1) >= 9 * len(lengths),
+        *calendar_of([cell[when] for cell in data[:FEW_TIMES]], times),
     )  # fmt: skip
 
 

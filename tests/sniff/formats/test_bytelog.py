@@ -110,6 +110,8 @@ def test_only_a_begin_on_the_line_is_an_exact_time(tmp_path: Path) -> None:
     assert read(path).session.adapter.latency == 0
     path.write_text("time,octet\n0.5,01\n")
     assert read(path).session.adapter.latency > 0
+    path.write_text(f"start,data\n0.5,{REQUEST.hex(' ')}\n0.6,{ANSWER.hex(' ')}\n")  # frames, as programs list them
+    assert read(path).session.adapter.latency > 0
 
 
 @pytest.mark.parametrize("step", [0, 4_000_000])
