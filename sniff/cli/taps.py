@@ -9,6 +9,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from dissectors.words import duration
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.offline import survey
 from sniff.cli import USAGE, Failure, arguments, json_output, tables
@@ -37,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     """Compare two taps."""
     from sniff.taps import words
 
-    heard, doubts = [], []
+    ears, doubts = [], []
     taps = _taps(args.words)
     spoken = []
     for path, capture in taps:
@@ -47,13 +48,13 @@ def run(args: argparse.Namespace) -> int:
             raise Failure(f"{path}: does not say when anything came; taps are compared by times", USAGE)
         ear = TapEar()
         survey(Watched(capture), session, ear, reference=args.reference)
-        heard.append(ear.frames())
+        ears.append(ear)
         doubts.append(_doubt(session))
     if spoken[0] != spoken[1]:
         raise Failure(f"A is {spoken[0]}, B is {spoken[1]}: these are not two taps on one line; -p names both", USAGE)
     doubt = sum(doubts)
-    first, second = heard
-    senders = traffic(first, second, matched(first, second, doubt))
+    first, second = (ear.frames() for ear in ears)
+    senders = traffic(first, second, matched(first, second, doubt, (ears[0].holes, ears[1].holes)))
     found = faults(senders, doubt)
     tables.write(words.HEADINGS if args.style == "text" else words.KEYS, words.rows(senders), args.style)
     if args.style == "json":
@@ -61,6 +62,9 @@ def run(args: argparse.Namespace) -> int:
             print(json_output.dumps(words.as_value(fault)))
     if args.style == "text":
         _say(found, bool(senders), any(one.both for one in senders.values()), doubt, taps[0][0], taps[1][0])
+        for name, ear in zip(words.TAPS, ears, strict=True):
+            if ear.holes.total:
+                print(f"left out: {duration(ear.holes.total)} in which {name} heard nothing, by its own account")
     return 1 if found else 0
 
 

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from dissectors.columns import NONE, Masks, Octets, Small, Times
 from dissectors.fingerprints import LONGEST, fingerprints, gathered
+from sniff.analysis.holes import Holes
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent
 from sniff.engine.table import Table
@@ -45,9 +46,10 @@ class TapFrames:
 
 
 class TapEar:
-    """Keeps what a tap heard. An observer of tables."""
+    """Keeps what a tap heard, and when it did not (`holes`). An observer of tables."""
 
     def __init__(self) -> None:
+        self.holes = Holes()
         self._parts: list[TapFrames] = []
         self._held = 0  # octets
 
@@ -57,13 +59,17 @@ class TapEar:
             self.add_table(Table.of_outputs("", output.rows[0].no, [output]))
 
     def add_line_event(self, event: LineEvent) -> None:
-        """What happened to the line says nothing about frames at the other tap."""
+        """Take what happened to the line: what came in a hole may have been whole."""
+        if event.kind.is_hole:
+            self.holes.miss(event)
 
     def add_table(self, table: Table) -> None:
         """Take rows that follow."""
         if not len(table):
             return
-        heard, lengths = table.heard, table.frames.length.astype(np.int64)
+        heard, lengths = table.heard.copy(), table.frames.length.astype(np.int64)
+        if heard.any():
+            self.holes.take(table.frames.start[heard], table.frames.end[heard])
         heard &= (lengths > 0) & (lengths <= LONGEST)
         places = np.flatnonzero(heard)
         if not len(places):

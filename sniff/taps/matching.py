@@ -13,8 +13,10 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
+import numpy.typing as npt
 
 from dissectors.columns import Times
+from sniff.analysis.holes import Holes
 from sniff.taps.frames import Keys, TapFrames
 
 REACH = 2_000_000_000
@@ -31,6 +33,9 @@ EVERYBODY = -2
 
 _TOGETHER = 4096
 """Rows that are compared in one step."""
+
+_MOST_ALIKE = 256
+"""Frames of one tap that one of the other may be; of more it tells nothing."""
 
 
 class CrossingOutcome(Enum):
@@ -61,13 +66,18 @@ class Matched:
     others: tuple[Crossing, ...]
 
 
-def matched(first: TapFrames, second: TapFrames, doubt: int) -> Matched:
-    """Pair two taps. `doubt`: ns that both adapters together may hold octets back. Frames outside the time in which
-    both taps listened are left out."""
+def matched(first: TapFrames, second: TapFrames, doubt: int, holes: tuple[Holes, Holes] | None = None) -> Matched:
+    """Pair two taps. `doubt`: ns that both adapters together may hold octets back. `holes`: of each tap. Frames outside
+    the time in which both taps listened are left out."""
     ours, theirs = _common(first, second), _common(second, first)
-    pairs = _paired(first, second, ours[first.good[ours]], theirs[second.good[theirs]])
-    left = np.setdiff1d(ours, pairs[0]), np.setdiff1d(theirs, pairs[1])
-    others = _Comparison((first, second), left, _delays(first, second, pairs), doubt + NEARBY).crossings()
+    pairs = _best_paired(first, second, ours[first.good[ours]], theirs[second.good[theirs]], doubt)
+    delays = _delays(first, second, pairs)
+    listened = holes or (Holes(), Holes())
+    left = (
+        _listened_to(first, np.setdiff1d(ours, pairs[0]), delays[EVERYBODY], second, listened[1], doubt),
+        _listened_to(second, np.setdiff1d(theirs, pairs[1]), -delays[EVERYBODY], first, listened[0], doubt),
+    )
+    others = _Comparison((first, second), left, delays, doubt + NEARBY).crossings()
     return Matched(*pairs, tuple(others))
 
 
@@ -80,8 +90,60 @@ def _common(one: TapFrames, other: TapFrames) -> Times:
     return np.flatnonzero(inside)
 
 
-def _paired(first: TapFrames, second: TapFrames, at: Times, to: Times) -> tuple[Times, Times]:
-    """Which of the good frames at these places are the same, ascending at both taps."""
+def _listened_to(one: TapFrames, places: Times, delay: int, other: TapFrames, holes: Holes, doubt: int) -> Times:
+    """Those of some frames that are no good frame at the other tap but came while it listened for certain: between its
+    first octet and its last, and in no hole. A frame that is damaged itself tells what befell another one."""
+    if not len(other):
+        return places
+    start, end = one.start[places] + delay, one.end[places] + delay
+    inside = (start >= other.start[0] + doubt) & (end <= other.end.max() - doubt)
+    if holes.ends:
+        near, begins, ends = doubt + NEARBY, np.array(holes.begins, np.int64), np.array(holes.ends, np.int64)
+        next_hole = np.searchsorted(ends, start - near)  # the first that is not over by then
+        begins = np.append(begins, np.iinfo(np.int64).max)
+        inside &= end + near < begins[next_hole]
+    kept: Times = places[inside | ~one.good[places]]
+    return kept
+
+
+def _best_paired(first: TapFrames, second: TapFrames, at: Times, to: Times, doubt: int) -> tuple[Times, Times]:
+    """Which of the good frames at these places are the same. Polls are alike in each round: where one tap began later,
+    those of one round look like those of another. So times decide as far as more frames are found the same with them.
+    """
+    nearly = [near + abs(_usual_delay(first, second, at, to, near)) for near in (doubt, doubt + NEARBY)]
+    found = [_paired(first, second, at, to, min(reach, REACH)) for reach in (*nearly, REACH)]
+    return max(found, key=lambda pairs: len(pairs[0]))
+
+
+def _usual_delay(first: TapFrames, second: TapFrames, at: Times, to: Times, near: int) -> int:
+    """ns from the first tap to the second that most frames have, told by those that stand out."""
+    at = at[:_TOGETHER]
+    order = np.lexsort((second.end[to], second.key[to]))
+    keys, ends = second.key[to][order], second.end[to][order]
+    delays: list[Times] = []
+    weights: list[npt.NDArray[np.float64]] = []
+    for key, end in zip(first.key[at].tolist(), first.end[at].tolist(), strict=True):
+        begin, over = (int(np.searchsorted(keys, np.uint64(key), side)) for side in ("left", "right"))
+        alike = ends[begin:over]
+        low, high = np.searchsorted(alike, [end - REACH, end + REACH + 1]).tolist()
+        if low < high <= low + _MOST_ALIKE:
+            delays.append(alike[low:high] - end)
+            weights.append(np.full(high - low, 1 / (high - low)))
+    if not delays:
+        return 0
+    apart, weight = np.concatenate(delays), np.concatenate(weights)
+    order = np.argsort(apart, kind="stable")
+    apart, summed = apart[order], np.append(0.0, np.cumsum(weight[order]))
+    last = np.searchsorted(apart, apart + near, "right")
+    within = summed[last] - summed[:-1]
+    best = np.flatnonzero(within >= 0.999 * within.max())
+    halves = np.searchsorted(summed, (summed[best] + summed[last[best]]) / 2)
+    middles = apart[np.clip(halves - 1, best, last[best] - 1)]
+    return int(middles[np.argmin(np.abs(middles))])
+
+
+def _paired(first: TapFrames, second: TapFrames, at: Times, to: Times, reach: int) -> tuple[Times, Times]:
+    """The same by frames that are never more than `reach` apart, ns; ascending at both taps."""
     keys, others = first.key[at], second.key[to]
     ends, other_ends = first.end[at], second.end[to]
     ours: list[Times] = []
@@ -90,7 +152,7 @@ def _paired(first: TapFrames, second: TapFrames, at: Times, to: Times) -> tuple[
     while i < len(keys) and j < len(others):
         count = min(_TOGETHER, len(keys) - i, len(others) - j)
         same = keys[i : i + count] == others[j : j + count]
-        same &= np.abs(ends[i : i + count] - other_ends[j : j + count]) <= REACH
+        same &= np.abs(ends[i : i + count] - other_ends[j : j + count]) <= reach
         run = int(np.argmin(same)) if not same.all() else count
         if run:
             ours.append(np.arange(i, i + run))
@@ -98,7 +160,7 @@ def _paired(first: TapFrames, second: TapFrames, at: Times, to: Times) -> tuple[
             i, j = i + run, j + run
         if run == count:
             continue
-        step = _next_common(keys, others, ends, other_ends, i, j)
+        step = _next_common(keys, others, ends, other_ends, i, j, reach)
         if step is None:
             # nothing near is common: whoever is behind in time goes on
             if ends[i] <= other_ends[j]:
@@ -111,14 +173,16 @@ def _paired(first: TapFrames, second: TapFrames, at: Times, to: Times) -> tuple[
     return at[np.concatenate([nothing, *ours])], to[np.concatenate([nothing, *theirs])]
 
 
-def _next_common(keys: Keys, others: Keys, ends: Times, other_ends: Times, i: int, j: int) -> tuple[int, int] | None:
+def _next_common(
+    keys: Keys, others: Keys, ends: Times, other_ends: Times, i: int, j: int, reach: int
+) -> tuple[int, int] | None:
     """The nearest places further on where both sides go on alike: fewest frames passed over, then nearest in time."""
     here, there = keys[i : i + AHEAD], others[j : j + AHEAD]
     rows, columns = np.nonzero(here[:, None] == there[None, :])
     if not len(rows):
         return None
     apart = np.abs(ends[i + rows] - other_ends[j + columns])
-    near = apart <= REACH
+    near = apart <= reach
     if not near.any():
         return None
     rows, columns, apart = rows[near], columns[near], apart[near]
