@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -195,10 +196,14 @@ class PointRun:
         last = next(plain.take(places[-1:]).samples())
         first = next(iter(plain.take(places[:1]).values())), int(plain.time[places[0]])
         history = list(replace(self, places=places[-HISTORY:]).numbers())
-        every = Histogram()
-        every.add_many(np.diff(plain.time[places]))
+        every, times, since = Histogram(), plain.time[places], None
+        steps = np.diff(times)
+        if table.is_apart(int(times[0]), int(times[-1])):
+            apart = np.array([table.is_apart(*two) for two in pairwise(times.tolist())], bool)
+            steps, since = steps[~apart], int(times[1:][apart][-1])
+        every.add_many(steps)
         written = int(np.count_nonzero(plain.how[places] == _WRITE))
-        seen = SampleRun(len(places), every, float(numbers.min()), float(numbers.max()), written)
+        seen = SampleRun(len(places), every, float(numbers.min()), float(numbers.max()), written, since)
         table.add_run(self.key, last, first, changed, history, seen)
 
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -21,23 +22,27 @@ from sniff.analysis.point_reader import Sample
 
 MOST_POINTS = 50_000
 HISTORY = 120
+MOST_HOLES = 4096
 
 
 class SampleRun(NamedTuple):
-    """Samples of one point that follow one another, as in `Point`."""
+    """Samples of one point that follow one another, as in `Point`. `since`: of the first behind the latest hole among
+    them, ns; None without one."""
 
     samples: int
     every: Histogram
     low: float
     high: float
     written: int
+    since: int | None = None
 
 
 @dataclass(slots=True)
 class Point:
     """The latest of one point. `changed`: ns, when its value last became another one, 0 when it never did; `history`:
     (ns, value). `first`: value and time, ns, of the earliest sample. `every`: ns from one sample to the next; `low`,
-    `high`: of its numbers; `written`: how many of the samples a master wrote."""
+    `high`: of its numbers; `written`: how many of the samples a master wrote; `since`: of the first sample behind the
+    latest hole, ns: over a hole there is no interval and no rate."""
 
     sample: Sample
     count: int = 0
@@ -47,6 +52,7 @@ class Point:
     low: float | None = None
     high: float | None = None
     written: int = 0
+    since: int | None = None
     first: tuple[int | float | str, int] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -81,15 +87,23 @@ class Point:
     @property
     def rate(self) -> float | None:
         """Mean change a second, up and down, lately; None where no time went by."""
-        if len(self.history) < 2 or self.history[-1][0] <= self.history[0][0]:
+        lately = [one for one in self.history if self.since is None or one[0] >= self.since]
+        if len(lately) < 2 or lately[-1][0] <= lately[0][0]:
             return None
-        moved = sum(abs(now - was) for (_, was), (_, now) in pairwise(self.history))
-        return moved * NS_PER_S / (self.history[-1][0] - self.history[0][0])
+        moved = sum(abs(now - was) for (_, was), (_, now) in pairwise(lately))
+        return moved * NS_PER_S / (lately[-1][0] - lately[0][0])
 
-    def add(self, sample: Sample) -> None:
+    def reach_time(self, time: int, is_behind_hole: bool) -> None:
+        """The next sample is of that time, ns."""
+        if is_behind_hole:
+            self.since = time
+        else:
+            self.every.add(time - self.sample.time)
+
+    def add(self, sample: Sample, is_behind_hole: bool = False) -> None:
         """Take a later sample."""
         if self.count:
-            self.every.add(sample.time - self.sample.time)
+            self.reach_time(sample.time, is_behind_hole)
             if _are_different(sample.value.value, self.sample.value.value):
                 self.changed = sample.time
         self.sample = sample
@@ -116,18 +130,20 @@ class Point:
             self.low,
             self.high,
             self.written,
+            self.since,
         )
         copy.first = self.first
         return copy
 
-    def go_on(self, later: Point) -> None:
+    def go_on(self, later: Point, is_behind_hole: bool = False) -> None:
         """Take what a later stretch saw of the same point."""
         if later.changed:
             self.changed = later.changed
         elif _are_different(later.first[0], self.sample.value.value):
             self.changed = later.first[1]
         self.every = self.every.merge(later.every)
-        self.every.add(later.first[1] - self.sample.time)
+        self.reach_time(later.first[1], is_behind_hole)
+        self.since = self.since if later.since is None else later.since
         if later.low is not None and later.high is not None:
             self.reach(later.low, later.high)
         self.written += later.written
@@ -152,6 +168,16 @@ class PointTable:
         self._points: dict[Key, Point] = {}
         self.dropped = 0
         self.version = 0
+        self._holes: list[int] = []  # when octets may have been missed, ns, ascending
+
+    def miss(self, time: int) -> None:
+        """Octets may be lost at `time`, ns."""
+        self._holes.append(max(time, self._holes[-1]) if self._holes else time)
+        del self._holes[:-MOST_HOLES]
+
+    def is_apart(self, one: int, later: int) -> bool:
+        """Whether there was a hole between two samples, by their times, ns."""
+        return bool(self._holes) and bisect_right(self._holes, one) < bisect_right(self._holes, later)
 
     def add(self, samples: Iterable[Sample]) -> None:
         """Take samples in the order of time."""
@@ -163,7 +189,7 @@ class PointTable:
                     self.dropped += 1
                     continue
                 point = self._points[key] = Point(sample)
-            point.add(sample)
+            point.add(sample, self.is_apart(point.sample.time, sample.time))
             self.version += 1
 
     def add_run(
@@ -187,7 +213,7 @@ class PointTable:
             point = self._points[key] = Point(last)
             point.first = first
         else:
-            point.every.add(first[1] - point.sample.time)
+            point.reach_time(first[1], self.is_apart(point.sample.time, first[1]))
             if _are_different(point.sample.value.value, first[0]):
                 point.changed = first[1]
         if changed is not None:
@@ -198,6 +224,7 @@ class PointTable:
         point.every = point.every.merge(seen.every)
         point.reach(seen.low, seen.high)
         point.written += seen.written
+        point.since = point.since if seen.since is None else seen.since
         self.version += count
 
     def merge(self, later: PointTable) -> PointTable:
@@ -205,11 +232,12 @@ class PointTable:
         was full, what it dropped stays dropped."""
         whole = PointTable()
         whole.dropped = self.dropped + later.dropped
+        whole._holes = sorted([*self._holes, *later._holes])[-MOST_HOLES:]
         whole._points = {key: point.copy() for key, point in self._points.items()}
         for key, point in later._points.items():
             mine = whole._points.get(key)
             if mine is not None:
-                mine.go_on(point)
+                mine.go_on(point, whole.is_apart(mine.sample.time, point.first[1]))
             elif len(whole._points) < MOST_POINTS:
                 whole._points[key] = point.copy()
             else:

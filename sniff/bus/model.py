@@ -148,6 +148,8 @@ class BusModel:
         self.judging.add_line_event(event)
         if self.reads_points:
             self.polls.add_line_event(event)
+            if event.kind.is_hole:
+                self.points.miss(event.time)
 
     def lend(self) -> LineJudging:
         """What judges the line, which somebody else feeds until it is taken back (`two_processes.py`)."""

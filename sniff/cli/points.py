@@ -153,8 +153,10 @@ def _chosen(args: argparse.Namespace, capture: Capture, session: Session) -> Ite
         yield _wanted(args, samples)
 
 
-def _samples(args: argparse.Namespace, capture: Capture, session: Session, devices: Devices) -> Iterator[TableSamples]:
-    """All samples, many at a time."""
+def _samples(
+    args: argparse.Namespace, capture: Capture, session: Session, devices: Devices, points: PointTable | None = None
+) -> Iterator[TableSamples]:
+    """All samples, many at a time. `points`: is told of holes."""
     from sniff.analysis.point_columns import TableSamples, no_samples
     from sniff.analysis.table_points import samples_of
     from sniff.engine.bulk import tables_of
@@ -162,7 +164,7 @@ def _samples(args: argparse.Namespace, capture: Capture, session: Session, devic
     reader = PointReader(dissector_for(session), devices)
     watched = Watched(capture, prints=True)
     if args.filter:
-        taken = _Taken(reader)
+        taken = _Taken(reader, points)
         filtering.surveyed(args, capture, session, taken, every_row=True, devices=reader.devices)
         yield TableSamples(no_samples(), [(0, sample) for sample in taken.samples])
         return
@@ -170,17 +172,26 @@ def _samples(args: argparse.Namespace, capture: Capture, session: Session, devic
         for output in outputs(watched.items(), session):
             if isinstance(output, Output):
                 yield TableSamples(no_samples(), [(0, sample) for sample in reader.add(output)])
+            else:
+                _happen(points, output)
         return
     for table in tables_of(watched, session):
-        if not isinstance(table, LineEvent):
+        if isinstance(table, LineEvent):
+            _happen(points, table)
+        else:
             yield samples_of(reader, table)
+
+
+def _happen(points: PointTable | None, event: LineEvent) -> None:
+    if points is not None and event.kind.is_hole:
+        points.miss(event.time)
 
 
 class _Taken:
     """The samples of exchanges that are handed on."""
 
-    def __init__(self, reader: PointReader) -> None:
-        self._reader = reader
+    def __init__(self, reader: PointReader, points: PointTable | None) -> None:
+        self._reader, self._points = reader, points
         self.samples: list[Sample] = []
 
     def add(self, output: Output) -> None:
@@ -188,7 +199,8 @@ class _Taken:
         self.samples += self._reader.add(output)
 
     def add_line_event(self, event: LineEvent) -> None:
-        """Nothing of it is kept."""
+        """Take what happened to the line."""
+        _happen(self._points, event)
 
 
 def _wanted(args: argparse.Namespace, samples: TableSamples) -> TableSamples:
@@ -206,7 +218,7 @@ def _latest_of(args: argparse.Namespace, capture: Capture, session: Session) -> 
     devices, dissector = arguments.noted_devices(args, session), dissector_for(session)
     points, end = PointTable(), None
     guessing = None if args.no_guess else Guessing(dissector, devices)
-    for samples in _samples(args, capture, session, devices):
+    for samples in _samples(args, capture, session, devices, points):
         if guessing is not None:
             guessing.add(samples)
         samples = _wanted(args, samples)
@@ -272,6 +284,10 @@ class _Values(watching.Listener):
     def on_time(self, live: LiveBus, now: int) -> None:
         """Ages are counted from here."""
         self.now = now
+
+    def on_event(self, live: LiveBus, event: LineEvent) -> None:
+        """Over a hole there is no interval."""
+        _happen(self.points, event)
 
     def on_samples(self, live: LiveBus, samples: list[Sample]) -> None:
         """Keep them, or print them."""

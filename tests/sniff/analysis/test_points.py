@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import importlib.util
+from dataclasses import replace
 from math import nan
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from dissectors.profiles import Devices
 from dissectors.profiles.decoding import Quality, decode
 from dissectors.profiles.packaged import packaged
 from dissectors.readings import Origin, Reading
+from sniff.analysis.point_columns import PlainSamples, TableSamples, add_to
 from sniff.analysis.point_reader import PointReader, Sample
 from sniff.analysis.points import Point, PointTable
 from sniff.bus.offline import settled
@@ -198,3 +201,35 @@ def test_reads_and_writes_of_a_point_are_counted_apart() -> None:
     assert point is not None
     assert (point.count, point.written) == (5, 2)
     assert (point.low, point.high) == (50.0, 60.0)
+
+
+@pytest.mark.parametrize("how", ["one by one", "many", "merged"])
+def test_over_a_hole_there_is_no_interval_and_no_rate(how: str) -> None:
+    second, held = 1_000_000_000, Reading("holding", 0, 0, 0, Origin.READ)
+    starts = [*range(20), *range(1000, 1020)]
+    values = [
+        Sample(time * second, 1, decode(None, [replace(held, raw=value, value=value)])[0], time)
+        for value, time in enumerate(starts)
+    ]
+    table, hole = PointTable(), 500 * second
+    if how == "merged":
+        later = PointTable()
+        table.add(values[:20])
+        later.miss(hole)
+        later.add(values[20:])
+        table = table.merge(later)
+    elif how == "many":
+        table.miss(hole)
+        columns = {name: np.array([0 for _ in values], np.int64) for name in ("space", "address", "how")}
+        numbers = np.arange(len(values), dtype=np.int64)
+        device = np.ones(len(values), np.int64)
+        times = np.array(starts, np.int64) * second
+        plain = PlainSamples(numbers, times, device, numbers, raw=numbers, spaces=("holding",), **columns)
+        add_to(table, TableSamples(plain, []))
+    else:
+        table.add(values[:20])
+        table.miss(hole)
+        table.add(values[20:])
+    (point,) = table
+    assert (point.every.most, point.every.count, point.since) == (second, 38, 1000 * second)
+    assert point.rate == 1
