@@ -116,7 +116,8 @@ _ALL = (
         "two stations seem to have one address",
         "At least three answers from one station, and 1 in 4 of its answers, that begin as they should and go on for "
         "more octets than the answer asked for, by about the same number each time, with a wrong check. Damage makes "
-        "no octets more, and noise does not always begin and end alike.",
+        "no octets more, and noise does not always begin and end alike. Not where two or more answers of others are "
+        "talked over, too, and its own no more often than by chance: who does that has no address of theirs.",
         "two stations with this address talk over each other, one a little later",
         "switch the station off and see whether something still answers",
         explains=_OF_COLLISIONS,

@@ -17,7 +17,8 @@ from dissectors.modbus.functions import EXCEPTIONS as EXCEPTION_NAMES
 from dissectors.modbus.header import code_number
 from dissectors.modbus.response_groups import AnsweredRequest
 from dissectors.modbus.rules import RULES
-from dissectors.modbus.station_record import Key, Requested, StationRecord, middle
+from dissectors.modbus.station_record import Key, Requested, StationRecord
+from dissectors.modbus.talked_over import second_voice
 from dissectors.words import duration, fine_milliseconds, percent
 from dissectors.wrong_checks import Habit
 
@@ -41,7 +42,6 @@ _GARBLED_LEAST = 5  # damaged answers that are no frame at all
 _TEXT_SHOWN = 24
 _SYSTEM_LEAST = 3  # of one kind, before it is a system
 _SECOND_RARE = 10  # answers for each second one, where these are rare
-_EXCESS_SPREAD = 2  # octets
 _HEX_SHOWN = 16
 _REPEATS_COST = 0.02
 _REPEATS_LEAST = 3  # fewer are no habit, however short the capture
@@ -57,7 +57,7 @@ def of_station(
     yield from systematic
     explained = sum(finding.count for finding in systematic)
     if 4 * explained < 3 * station.damaged.count:
-        yield from _damaged(seen, name, station, is_common)
+        yield from _damaged(seen, unit, station, is_common)
     yield from _exceptions(seen, name, unit, station)
     if station.unfit.count:
         why, _ = station.unfit_words.most_common(1)[0] if station.unfit_words else ("", 0)
@@ -136,7 +136,8 @@ def _is_ignored(request: Requested) -> bool:
     return request.turns >= 3 and request.missing.count == request.tries
 
 
-def _damaged(seen: BusRecord, name: str, station: StationRecord, is_common: bool) -> Iterator[Finding]:
+def _damaged(seen: BusRecord, unit: int, station: StationRecord, is_common: bool) -> Iterator[Finding]:
+    name = f"station {unit}"
     damaged, ends = station.damaged, station.last_octet
     if not damaged.count or is_absent(station):
         return
@@ -146,13 +147,9 @@ def _damaged(seen: BusRecord, name: str, station: StationRecord, is_common: bool
         yield ends.found(RULES["MB006"], name, words, note_if(rare))
         if 4 * ends.count >= 3 * damaged.count:
             return
-    over = station.talked_over
-    if over.count >= 3 and 4 * over.count >= station.asked and _is_steady(station.excess):
-        words = (
-            f"{over.count} of {counted(station.asked, 'answer')} begin as they should and go on for "
-            f"{_octets(middle(station.excess))} more than they can have, damaged: two talk at once"
-        )
-        yield over.found(RULES["MB202"], name, words)
+    second = second_voice(seen, unit, station)
+    if second is not None:
+        yield second
     details = []
     if station.cut:
         details.append(f"{station.cut} ended early")
@@ -254,12 +251,6 @@ def _foreign(seen: BusRecord, name: str, station: StationRecord) -> Finding | No
     elif text is not None:
         words += f"; it is text{f' with 7 data bits and {text[1]} parity' if text[1] else ''}: {_quoted(text[0])}"
     return garbage.tally.found(RULES["MB014"], name, words)
-
-
-def _is_steady(values: Sequence[int]) -> bool:
-    """Whether most of them lie close together, as they do when two always begin a little apart."""
-    usual = middle(values) if values else 0
-    return 3 * sum(abs(value - usual) <= _EXCESS_SPREAD for value in values) >= 2 * len(values) > 0
 
 
 def _quoted(text: str) -> str:

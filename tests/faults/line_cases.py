@@ -80,6 +80,14 @@ def _dies(address: int, delay: int) -> Station:
     return Dies(follower(address, delay), at=30 * S, until=42 * S)
 
 
+_beside_bacnet = Modbus(
+    usual_requests(_FOUR),
+    usual_stations(_FOUR),
+    others={"bacnet drive": _bacnet_drive},
+    line=RTU_8N1,
+    interval=1_300 * MS,
+)
+
 LINE_CASES: tuple[Case, ...] = (
     # patterns in time
     Case("RTU mains hum", _with(_rtu, others={"hum": _hum}), (Said(_bus, words=_HUM),)),
@@ -202,16 +210,18 @@ LINE_CASES: tuple[Case, ...] = (
     # somebody with another protocol
     Case(
         "RTU one drive still speaks BACnet",
-        Modbus(
-            usual_requests(_FOUR),
-            usual_stations(_FOUR),
-            others={"bacnet drive": _bacnet_drive},
-            line=RTU_8N1,
-            interval=1_300 * MS,
-        ),
+        _beside_bacnet,
         (Said(_bus, ("LN204",), _OTHER),),
         also=("LN003",),
         never=("MB203",),
+        seeds=1,
+    ),
+    Case(
+        "RTU one drive still speaks BACnet, heard for a short time",
+        _beside_bacnet,
+        (Said(_bus, ("LN303",)),),
+        seconds=20,
+        never=("MB202", "MB203"),
         seeds=1,
     ),
     # a converter that gives back what the master sends
