@@ -11,6 +11,7 @@ from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.finding_words import note_if, units
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.station_record import StationRecord
+from dissectors.perhaps_late import perhaps_late
 from dissectors.words import fine_milliseconds
 
 _OUTLASTING_LEAST = 3
@@ -42,7 +43,11 @@ def of_late_speakers(seen: BusRecord) -> Iterator[Finding]:
         many = 4 * station.outlasting.count >= station.damaged.count
         if station.outlasting.count >= _OUTLASTING_LEAST and many and unit not in named:
             words = f"{counted(station.outlasting.count, 'answer')} not over when the master gave up, which then spoke"
+            named.add(unit)
             yield station.outlasting.found(RULES["MB106"], f"station {unit}", f"{words} into them")
+    perhaps = perhaps_late(seen.late_speakers, whole, heard) if not named else None
+    if perhaps is not None and not seen.rare(perhaps.struck, perhaps.of + perhaps.of_elsewhere):
+        yield perhaps.told_of(RULES["MB106"])
 
 
 def of_impatience(seen: BusRecord, timeout: int | None) -> Iterator[Finding]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from dissectors.chances import is_rare
 from dissectors.findings import Finding, counted
 from dissectors.late_speakers import MASTER, NOBODY, Heard, LateSpeakers, is_behind, late_speakers, told
 from dissectors.n2.record import N2StationRecord
 from dissectors.n2.rules import RULES
 from dissectors.n2.wording import N2Evidence
+from dissectors.perhaps_late import perhaps_late
 
 
 def of_late_speakers(heard: N2Evidence, late: LateSpeakers) -> Iterator[Finding]:
@@ -28,7 +30,11 @@ def of_late_speakers(heard: N2Evidence, late: LateSpeakers) -> Iterator[Finding]
                 f"{station.behind.count} of {counted(heard.master.bad.count, 'damaged command')} came directly behind "
             )
             seen += "a command to it that nothing had followed"
+            told_of.add(address)
             yield station.behind.found(RULES["N2014"], f"station {address}", seen)
+    perhaps = perhaps_late(late, whole, known) if not told_of else None
+    if perhaps is not None and not is_rare(perhaps.struck, perhaps.of + perhaps.of_elsewhere, heard.span):
+        yield perhaps.told_of(RULES["N2014"])
 
 
 def _is_behind(heard: N2Evidence, station: N2StationRecord) -> bool:

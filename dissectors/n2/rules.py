@@ -155,7 +155,9 @@ RULES: dict[str, Rule] = {
             "Damage that stands while the answer of one station is overdue, at least three times, and far more often "
             "then than in frames of the same senders elsewhere (chance under 1 in 500); or commands of which so many "
             "are damaged directly behind one to it that nothing followed. An answer after the master's "
-            "timeout falls on the next command or on the answer to it, and two senders at once are no frame.",
+            "timeout falls on the next command or on the answer to it, and two senders at once are no frame. Where "
+            "nearly all damage stands there, but so little that chance may have put it there, the bus is told of and "
+            "nobody named.",
             "the station answers when its master has given up; those whose frames are hit are not to blame",
             "raise the message timeout of the master, or find out why this station is slow; nobody else's cable",
             explains=("N2003", "N2004", "N2005", "N2006", "N2011", "LN1", "LN2"),

@@ -49,6 +49,12 @@ def _case(name: str, bus: Modbus | N2, tap: TapModel | None = None) -> Case:
     return made() if tap is None else made(tap=tap)
 
 
+def _short_case(name: str, bus: Modbus | N2) -> Case:
+    """Too little damage to prove whose doing it is: nobody is named for it, only who does not answer in time."""
+    expect = (Said(("bus",), ("MB106", "N2014")),)
+    return Case(name, bus, expect, seconds=8, seeds=1, struck=("station 2",))
+
+
 _SELDOM = Modbus(
     tuple(read_holding(unit, start, 1) for unit in (40, 80, 126) for start in (0, 3)),
     usual_stations((40, 80, 126), unit_40=12 * MS, unit_80=8 * MS, unit_126=30 * MS),
@@ -70,6 +76,9 @@ _ALL = Modbus(
 LATE_CASES: tuple[Case, ...] = (
     _case("RTU answers into the next station, no repeats", _bus(240, retries=0)),
     _case("N2 answers into the next station", _n2(250, 15)),
+    _short_case("RTU answers into the next station, heard for a short time", _bus(232)),
+    _short_case("ASCII answers into the next station, heard for a short time", _bus(240, is_ascii=True, quantity=12)),
+    _short_case("N2 answers into the next station, heard for a short time", _n2(250, 15)),
 )
 
 FURTHER_LATE_CASES: tuple[Case, ...] = (
