@@ -8,6 +8,7 @@ from dissectors.frame import Frame, Header, Role
 from dissectors.late_speakers import Due
 from dissectors.modbus.envelope import ASCII_NAME
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, ITEMS_ASKED, answer_length
+from dissectors.modbus.limits import beyond_limits
 from dissectors.modbus.notation import CHECK, HEAD
 from dissectors.modbus.poll_order import Asked
 from dissectors.modbus.station_record import Key
@@ -78,3 +79,8 @@ class AskedRequest:
     def fault(self) -> str | None:
         """What it says that contradicts itself, though its check is good."""
         return self.header.error if self.header.ok and not self.octets[1] & EXCEPTION_BIT else None
+
+    @property
+    def beyond(self) -> str | None:
+        """What it asks for that nobody can have; None where its check is bad, for nobody knows what was asked then."""
+        return beyond_limits(self.octets) if self.header.ok else None

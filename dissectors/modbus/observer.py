@@ -17,7 +17,7 @@ from dissectors.modbus.check_mistakes import ways
 from dissectors.modbus.envelope import RTU_NAME
 from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.learned_timing import READ
-from dissectors.modbus.limits import ILLEGAL, beyond_limits
+from dissectors.modbus.limits import ILLEGAL
 from dissectors.modbus.pairing import is_answer
 from dissectors.modbus.poll_order import Neighbours
 from dissectors.modbus.remembered import FINAL_KEPT, LOST_KEPT, OPEN_KEPT, SLOW_UNLEARNT, Unfit, slow_limit
@@ -216,7 +216,7 @@ class ModbusFindings(RowObserver):
         why = asked.fault
         is_carried_out = (asked.key, asked.octets) in station.same
         if why is None and (code in ILLEGAL or (verdict is Verdict.NO_RESPONSE and not is_carried_out)):
-            why = beyond_limits(asked.octets)
+            why = asked.beyond
         if why is not None:
             self.seen.cannot_be(why, transaction.start, transaction.request, transaction.response)
             if verdict is Verdict.NO_RESPONSE:  # a station may pass over it

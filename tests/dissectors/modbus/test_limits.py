@@ -67,3 +67,10 @@ def test_an_illegal_function_is_no_such_refusal(bus):
     for _ in range(4):
         bus.exchange(OTHER, OTHER_VALUES).exchange("010300000000", "018301")
     assert graves_of(bus) == {("MB008", "station 1")}
+
+
+def test_a_damaged_request_does_not_say_what_was_asked(bus):
+    for _ in range(4):
+        bus.exchange(OTHER, OTHER_VALUES)
+        bus.damage("010300000002", 40, at=4).say("018303")  # 4098 registers, as it is
+    assert not [one for one in findings_of(bus) if one.code == "MB016"]
