@@ -1,4 +1,4 @@
-"""One decoder and one encoder for all parameter tables: tags ↔ named values.
+"""One decoder for all parameter tables: tags → named values. `encode` of encoding.py is the way back.
 
 Decoding is total: what does not fit its layout keeps what was read, says why, and leaves the rest as tags. `Any` is
 read with the type of the property that the message names; where that does not fit, by the tags alone.
@@ -6,15 +6,17 @@ read with the type of the property that the message names; where that does not f
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field as made
 from typing import Any
 
 from dissectors.bacnet import layout as notation
 from dissectors.bacnet import tags as tagging
+from dissectors.bacnet.encoding import encode as encode
+from dissectors.bacnet.encoding import encode_any as encode_any
 from dissectors.bacnet.layout import LayoutField
-from dissectors.bacnet.property_types import BY_OBJECT, PROPERTY_TYPES
+from dissectors.bacnet.property_types import BY_OBJECT, PROPERTY_TYPES, VARYING
 from dissectors.bacnet.tags import Tag
 from dissectors.bacnet.values import (
     APPLICATION,
@@ -23,11 +25,9 @@ from dissectors.bacnet.values import (
     Enumerated,
     ObjectId,
     base,
-    pack,
     primitive,
     show,
     show_part,
-    type_of,
 )
 
 KNOWN_OBJECTS = 63
@@ -129,8 +129,8 @@ class _Scope:
         if self.property is None:
             return None
         found = PROPERTY_TYPES.get(self.property)
-        if self.object is not None:
-            found = BY_OBJECT.get((self.object.type, self.property), found)
+        if self.object is not None and self.property in VARYING:
+            found = BY_OBJECT.get((self.object.type, self.property))
         if found is not None and found.startswith("{") and self.index is not None:
             return "Unsigned" if self.index == 0 else found[1:-1]
         return found
@@ -185,6 +185,8 @@ def _fits(field: LayoutField, tags: Sequence[Tag], at: int) -> bool:
     tag = tags[at]
     if field.tag is not None:
         return tag.context and tag.number == field.tag
+    if field.type in notation.ANYTHING:
+        return not tag.context
     kind = base(field.type)
     if kind is not None:
         return not tag.context and tag.number == NUMBER_OF[kind]
@@ -205,7 +207,7 @@ def _field(field: LayoutField, tags: Sequence[Tag], at: int, scope: _Scope, dept
         raise _Misfit(f"{field.name} is nested too deep")
     if field.tag is None:
         value, after = _in_place(field.type, tags, at, scope, depth)
-        if base(field.type) is not None:
+        if base(field.type) is not None or (field.type in notation.ANYTHING and after == at + 1):
             scope.name_part(tags[at], field, value)
         return value, after
     tag = tags[at]
@@ -231,8 +233,9 @@ def _in_place(type_name: str, tags: Sequence[Tag], at: int, scope: _Scope, depth
     """A value of the type whose tags stand at `at`, without a context tag around it."""
     if depth > _DEPTH_MAX:
         raise _Misfit(f"{type_name} is nested too deep")
-    if type_name == "Any":
-        return _any(tags[at:], scope, depth), len(tags)
+    if type_name in notation.ANYTHING:
+        end = _end_of_anything(type_name, tags, at)
+        return _any(tags[at:end], scope, depth), end
     if type_name.startswith("{"):
         item, values = type_name[1:-1], []
         while at < len(tags):
@@ -263,6 +266,15 @@ def _in_place(type_name: str, tags: Sequence[Tag], at: int, scope: _Scope, depth
     record = ConstructedValue(type_name, tuple(entries))
     scope.group(tags[at:after], record)
     return record, after
+
+
+def _end_of_anything(type_name: str, tags: Sequence[Tag], at: int) -> int:
+    """Where a value of no certain type ends that begins at `at`."""
+    if type_name == "AnyPrimitive":
+        return at + 1
+    if type_name == "AnyApplication":
+        return next((place for place in range(at, len(tags)) if tags[place].context), len(tags))
+    return len(tags)
 
 
 def _named(field: LayoutField, value: Any) -> str:
@@ -331,72 +343,3 @@ def plain(tag: Tag) -> Any:
         return primitive(APPLICATION[tag.number], tag.octets)
     except ValueError:
         return tag
-
-
-# Encoding
-
-
-def encode(layout: str, values: Mapping[str, Any] | ConstructedValue) -> bytes:
-    """The octets of parameters by a layout.
-
-    Values are what `decode` gives, or plain Python ones: names for enumerations, "device,1" for objects, mappings for
-    sequences, a mapping of one for a choice. Raises ValueError, KeyError or TypeError when they do not fit.
-    """
-    return tagging.write(_encode_sequence(notation.parse(layout), values))
-
-
-def _encode_sequence(fields: Sequence[LayoutField], values: Mapping[str, Any] | ConstructedValue) -> list[Tag]:
-    given = dict(values.entries) if isinstance(values, ConstructedValue) else dict(values)
-    tags: list[Tag] = []
-    for field in fields:
-        if field.name not in given:
-            if field.optional:
-                continue
-            raise KeyError(f"{field.name} is missing")
-        tags += _encode_field(field, given.pop(field.name))
-    if given:
-        raise KeyError(f"no such parameter: {', '.join(sorted(given))}")
-    return tags
-
-
-def _encode_field(field: LayoutField, value: Any) -> list[Tag]:
-    if field.tag is None:
-        return _encode_in_place(field.type, value)
-    if base(field.type) is not None:
-        return [Tag(field.tag, True, pack(field.type, value))]
-    return [Tag(field.tag, True, b"", tuple(_encode_in_place(field.type, value)))]
-
-
-def _encode_in_place(type_name: str, value: Any) -> list[Tag]:
-    if type_name == "Any":
-        return encode_any(value)
-    if type_name.startswith("{"):
-        return [tag for item in value for tag in _encode_in_place(type_name[1:-1], item)]
-    kind = base(type_name)
-    if kind is not None:
-        return [Tag(NUMBER_OF[kind], False, pack(type_name, value))]
-    alternatives = notation.choice(type_name)
-    if alternatives is not None:
-        ((name, chosen),) = dict(value.entries if isinstance(value, ConstructedValue) else value).items()
-        for field in alternatives:
-            if field.name == name:
-                return _encode_field(field, chosen)
-        raise KeyError(f"{type_name} has no alternative {name}")
-    fields = notation.sequence(type_name)
-    if fields is None:
-        raise ValueError(f"{type_name} is not known")
-    return _encode_sequence(fields, value)
-
-
-def encode_any(value: Any) -> list[Tag]:
-    """The tags of any value: a plain one, a Record of a known type, tags, or several of them."""
-    if isinstance(value, Tag):
-        return [value]
-    if isinstance(value, ConstructedValue):
-        if value.type is None:
-            raise ValueError("a record without a type has no layout")
-        return _encode_in_place(value.type, value)
-    if isinstance(value, (tuple, list)):
-        return [tag for item in value for tag in encode_any(item)]
-    kind = type_of(value)
-    return [Tag(NUMBER_OF[kind], False, pack(kind, value))]

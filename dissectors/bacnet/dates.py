@@ -12,6 +12,9 @@ ANY = 255
 
 WEEKDAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
 
+MONTHS = (  # noqa: SIM905
+    "January February March April May June July August September October November December"
+).split()
 _ODD_MONTH, _EVEN_MONTH = 13, 14
 _LAST_DAY, _ODD_DAY, _EVEN_DAY = 32, 33, 34
 
@@ -108,3 +111,29 @@ class Time:
 
     def __str__(self) -> str:
         return self.plain if self.flaw is None else f"{self.plain} ({WhenFlaw.NO_SUCH_TIME.value})"
+
+
+_WEEKS = {
+    1: "days 1-7",
+    2: "days 8-14",
+    3: "days 15-21",
+    4: "days 22-28",
+    5: "days 29-31",
+    6: "last 7 days",
+    7: "7 days before the last 7",
+    8: "7 days before the last 14",
+    9: "7 days before the last 21",
+    ANY: "any week",
+}
+
+
+def week_and_day(octets: bytes) -> str | None:
+    """A BACnetWeekNDay: "Friday of last 7 days of any month"; None where the octets are none (clause 21)."""
+    if len(octets) != 3:
+        return None
+    month, week, weekday = octets
+    months = {ANY: "any month", _ODD_MONTH: "odd months", _EVEN_MONTH: "even months"} | dict(enumerate(MONTHS, 1))
+    days = {ANY: "any day"} | dict(enumerate(WEEKDAYS, 1))
+    if month not in months or week not in _WEEKS or weekday not in days:
+        return None
+    return f"{days[weekday]} of {_WEEKS[week]} of {months[month]}"

@@ -16,8 +16,7 @@ ENUMERATIONS: dict[str, dict[int, str]] = {
         """
         0 other 1 buffer-overflow 2 invalid-apdu-in-this-state 3 preempted-by-higher-priority-task 4
         segmentation-not-supported 5 security-error 6 insufficient-security 7 window-size-out-of-range 8
-        application-exceeded-reply-time 9 out-of-resources 10 tsm-timeout 11 apdu-too-long 64 server-timeout 65
-        no-response
+        application-exceeded-reply-time 9 out-of-resources 10 tsm-timeout 11 apdu-too-long
         """
     ),
     "AccessAuthenticationFactorDisable": _table(
@@ -109,8 +108,8 @@ ENUMERATIONS: dict[str, dict[int, str]] = {
     "AuthenticationFactorType": _table(
         """
         0 undefined 1 error 2 custom 3 simple-number16 4 simple-number32 5 simple-number56 6
-        simple-alpha-numeric 7 aba-track2 8 wiegand26 9 wiegand37 10 wiegand37facility 11 facility16card32 12
-        facility32card32 13 fasc-n 14 fasc-nbcd 15 fasc-nlarge 16 fasc-nlarge-bcd 17 gsa75 18 chuid 19
+        simple-alpha-numeric 7 aba-track2 8 wiegand26 9 wiegand37 10 wiegand37-facility 11 facility16-card32 12
+        facility32-card32 13 fasc-n 14 fasc-n-bcd 15 fasc-n-large 16 fasc-n-large-bcd 17 gsa75 18 chuid 19
         chuid-full 20 guid 21 cbeff-a 22 cbeff-b 23 cbeff-c 24 user-password
         """
     ),
@@ -132,7 +131,7 @@ ENUMERATIONS: dict[str, dict[int, str]] = {
     ),
     "BackupState": _table(
         """
-        0 idle 1 preparing-for-backup 2 preparing-for-restore 3 performing-abackup 4 performing-arestore 5
+        0 idle 1 preparing-for-backup 2 preparing-for-restore 3 performing-a-backup 4 performing-a-restore 5
         backup-failure 6 restore-failure
         """
     ),
@@ -235,7 +234,7 @@ ENUMERATIONS: dict[str, dict[int, str]] = {
         siemens-per-meter 175 teslas 176 volts-per-degree-kelvin 177 volts-per-meter 178 webers 179 candelas 180
         candelas-per-square-meter 181 degrees-kelvin-per-hour 182 degrees-kelvin-per-minute 183 joule-seconds
         184 radians-per-second 185 square-meters-per-newton 186 kilograms-per-cubic-meter 187 newton-seconds 188
-        newtons-per-meter 189 watts-per-meter-per-degree-kelvin 190 micro-siemens 191 cubic-feet-per-hour 192
+        newtons-per-meter 189 watts-per-meter-per-degree-kelvin 190 microsiemens 191 cubic-feet-per-hour 192
         us-gallons-per-hour 193 kilometers 194 micrometers 195 grams 196 milligrams 197 milliliters 198
         milliliters-per-second 199 decibels 200 decibels-millivolt 201 decibels-volt 202 millisiemens 203
         watt-hours-reactive 204 kilowatt-hours-reactive 205 megawatt-hours-reactive 206 millimeters-of-water 207
@@ -245,10 +244,10 @@ ENUMERATIONS: dict[str, dict[int, str]] = {
         micrograms-per-cubic-meter 220 nanograms-per-cubic-meter 221 grams-per-cubic-centimeter 222 becquerels
         223 kilobecquerels 224 megabecquerels 225 gray 226 milligray 227 microgray 228 sieverts 229
         millisieverts 230 microsieverts 231 microsieverts-per-hour 232 decibels-a 233
-        nephelometric-turbidity-unit 234 p-h 235 grams-per-square-meter 236 minutes-per-degree-kelvin 237
-        ohm-meter-per-square-meter 238 ampere-seconds 239 volt-ampere-hours 240 kilovolt-ampere-hours 241
+        nephelometric-turbidity-unit 234 ph 235 grams-per-square-meter 236 minutes-per-degree-kelvin 237
+        ohm-meter-squared-per-meter 238 ampere-seconds 239 volt-ampere-hours 240 kilovolt-ampere-hours 241
         megavolt-ampere-hours 242 volt-ampere-hours-reactive 243 kilovolt-ampere-hours-reactive 244
-        megavolt-ampere-hours-reactive 245 volts-square-hours 246 ampere-square-hours 247 joules-per-hours 248
+        megavolt-ampere-hours-reactive 245 volt-square-hours 246 ampere-square-hours 247 joule-per-hours 248
         cubic-feet-per-day 249 cubic-meters-per-day 250 watt-hours-per-cubic-meter 251 joules-per-cubic-meter
         253 pascal-seconds
         """
@@ -446,7 +445,7 @@ ENUMERATIONS: dict[str, dict[int, str]] = {
     ),
     "LockStatus": _table(
         """
-        0 locked 1 unlocked 2 fault 3 unknown
+        0 locked 1 unlocked 2 fault
         """
     ),
     "LoggingType": _table(
@@ -466,7 +465,7 @@ ENUMERATIONS: dict[str, dict[int, str]] = {
     ),
     "NetworkPortCommand": _table(
         """
-        0 idle 1 discard-changes 2 renew-fd-dregistration 3 restart-slave-discovery 4 renew-dhcp 5
+        0 idle 1 discard-changes 2 renew-fd-registration 3 restart-slave-discovery 4 renew-dhcp 5
         restart-autonegotiation 6 disconnect 7 restart-port
         """
     ),
@@ -684,7 +683,7 @@ ENUMERATIONS: dict[str, dict[int, str]] = {
     ),
     "SecurityLevel": _table(
         """
-        0 incapable 1 plain 2 signed 3 encrypted 4 encrypted-end-to-end
+        0 incapable 1 plain 2 signed 3 encrypted 4 signed-end-to-end 5 encrypted-end-to-end
         """
     ),
     "SecurityPolicy": _table(
@@ -733,7 +732,7 @@ ENUMERATIONS: dict[str, dict[int, str]] = {
     ),
     "VTClass": _table(
         """
-        0 default-terminal 1 ansi-x364 2 dec-vt52 3 dec-vt100 4 dec-vt220 5 hp70094 6 ibm3130
+        0 default-terminal 1 ansi-x3-64 2 dec-vt52 3 dec-vt100 4 dec-vt220 5 hp-700-94 6 ibm-3130
         """
     ),
     "WriteStatus": _table(

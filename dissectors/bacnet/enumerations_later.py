@@ -12,7 +12,7 @@ NEWER: dict[str, dict[int, str]] = {
     ),
     "ObjectType": _table(
         """
-        63 color 64 color-temperature 65535 none
+        63 color 64 color-temperature
         """
     ),
     "ErrorCode": _table(
@@ -25,7 +25,7 @@ NEWER: dict[str, dict[int, str]] = {
         incorrect-client 214 install-scope-required 215 insufficient-scope 216 no-default-scope 217 no-policy
         218 revoked-token 219 override-scope-required 220 inactive-token 221 unknown-audience 222 unknown-client
         223 unknown-scope 224 view-scope-required 225 incorrect-audience 226 incorrect-client-origin 227
-        invalid-array-size 228 incorrect-issuer 229 invalid-token 65534 discard
+        invalid-array-size 228 incorrect-issuer 229 invalid-token
         """
     ),
     "RejectReason": _table(
@@ -42,20 +42,21 @@ NEWER: dict[str, dict[int, str]] = {
         """
         18 blank-1 95 protocol-conformance-class 101 recipient 129 current-notify-time 138 previous-notify-time
         508 additional-reference-ports 509 certificate-signing-request-file 510 command-validation-result 511
-        issuer-certificate-files 4194306 operational-certificate-file 4194307 current-health 4194308
-        sc-connect-wait-timeout 4194309 sc-direct-connect-accept-enable 4194310 sc-direct-connect-accept-uris
-        4194311 sc-direct-connect-binding 4194312 sc-direct-connect-connection-status 4194313
-        sc-direct-connect-initiate-enable 4194314 sc-disconnect-wait-timeout 4194315
-        sc-failed-connection-requests 4194316 sc-failover-hub-connection-status 4194317 sc-failover-hub-uri
-        4194318 sc-hub-connector-state 4194319 sc-hub-function-accept-uris 4194320 sc-hub-function-binding
-        4194321 sc-hub-function-connection-status 4194322 sc-hub-function-enable 4194323 sc-heartbeat-timeout
-        4194324 sc-primary-hub-connection-status 4194325 sc-primary-hub-uri 4194327 sc-minimum-reconnect-time
-        4194328 color-override 4194329 color-reference 4194330 default-color 4194331 default-color-temperature
-        4194332 override-color-reference 4194334 color-command 4194335 high-end-trim 4194336 low-end-trim
-        4194337 trim-fade-time 4194338 device-address-proxy-enable 4194339 device-address-proxy-table 4194340
-        device-address-proxy-timeout 4194341 default-on-value 4194343 authorization-cache 4194344
-        authorization-groups 4194345 authorization-policy 4194346 authorization-scope 4194347
-        authorization-server 4194348 authorization-status
+        issuer-certificate-files 4194304 max-bvlc-length-accepted 4194305 max-npdu-length-accepted 4194306
+        operational-certificate-file 4194307 current-health 4194308 sc-connect-wait-timeout 4194309
+        sc-direct-connect-accept-enable 4194310 sc-direct-connect-accept-uris 4194311 sc-direct-connect-binding
+        4194312 sc-direct-connect-connection-status 4194313 sc-direct-connect-initiate-enable 4194314
+        sc-disconnect-wait-timeout 4194315 sc-failed-connection-requests 4194316
+        sc-failover-hub-connection-status 4194317 sc-failover-hub-uri 4194318 sc-hub-connector-state 4194319
+        sc-hub-function-accept-uris 4194320 sc-hub-function-binding 4194321 sc-hub-function-connection-status
+        4194322 sc-hub-function-enable 4194323 sc-heartbeat-timeout 4194324 sc-primary-hub-connection-status
+        4194325 sc-primary-hub-uri 4194326 sc-maximum-reconnect-time 4194327 sc-minimum-reconnect-time 4194328
+        color-override 4194329 color-reference 4194330 default-color 4194331 default-color-temperature 4194332
+        override-color-reference 4194334 color-command 4194335 high-end-trim 4194336 low-end-trim 4194337
+        trim-fade-time 4194338 device-address-proxy-enable 4194339 device-address-proxy-table 4194340
+        device-address-proxy-timeout 4194341 default-on-value 4194342 last-on-value 4194343 authorization-cache
+        4194344 authorization-groups 4194345 authorization-policy 4194346 authorization-scope 4194347
+        authorization-server 4194348 authorization-status 4194349 max-proxied-i-ams-per-second
         """
     ),
     "EngineeringUnits": _table(
@@ -109,4 +110,66 @@ NEWER: dict[str, dict[int, str]] = {
         degree-seconds-fahrenheit 47979 microseconds 47980 nanoseconds 47981 picoseconds
         """
     ),
+    "AccessEvent": _table(
+        """
+        16 no-entry-after-granted
+        """
+    ),
+    "BinaryLightingPV": _table(
+        """
+        6 toggle
+        """
+    ),
+    "DoorStatus": _table(
+        """
+        3 door-fault 4 unused 5 none 6 closing 7 opening 8 safety-locked 9 limited-opened
+        """
+    ),
+    "LifeSafetyMode": _table(
+        """
+        15 activated-oeo-alarm 16 activated-oeo-evacuate 17 activated-oeo-phase1-recall 18
+        activated-oeo-unavailable 19 deactivated
+        """
+    ),
+    "LifeSafetyState": _table(
+        """
+        24 non-default-mode 25 oeo-unavailable 26 oeo-alarm 27 oeo-phase1-recall 28 oeo-evacuate 29
+        oeo-unaffected 30 test-oeo-unavailable 31 test-oeo-alarm 32 test-oeo-phase1-recall 33 test-oeo-evacuate
+        34 test-oeo-unaffected
+        """
+    ),
+    "LightingInProgress": _table(
+        """
+        5 trim-active
+        """
+    ),
+    "LightingOperation": _table(
+        """
+        11 restore-on 12 default-on 13 toggle-restore 14 toggle-default
+        """
+    ),
+    "NetworkPortCommand": _table(
+        """
+        8 restart-discovery 9 generate-csr-file 10 validate-changes
+        """
+    ),
+    "NetworkType": _table(
+        """
+        8 non-bacnet 11 secure-connect
+        """
+    ),
 }
+
+NEWER_BITS: dict[str, dict[int, str]] = {
+    "ObjectTypesSupported": _table(
+        """
+        31 timer 63 color 64 color-temperature
+        """
+    ),
+    "ServicesSupported": _table(
+        """
+        13 read-property-conditional 24 authenticate 25 request-key 49 auth-request
+        """
+    ),
+}
+"""The same of named bits; 13, 24 and 25 are services that devices of old have and the standard has no more."""

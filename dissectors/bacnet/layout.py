@@ -3,7 +3,9 @@
     "[0] object-identifier ObjectIdentifier, [2]? array-index Unsigned, [3] value Any, ? count Unsigned, items {Item}"
 
 [n] context tag n (none: application tag, or the parts of the type follow in place) · ? may be absent · {X} list of X ·
-Any: whatever the property holds. A type is an application type, an enumeration, a bit string, a sequence or a choice.
+Any: whatever the property holds, to the end · AnyPrimitive: one application tag of any type · AnyApplication: all
+application tags to the next context tag. A type is an application type, an enumeration, a bit string, a sequence or a
+choice.
 """
 
 from __future__ import annotations
@@ -17,6 +19,9 @@ from dissectors.bacnet.sequences import SEQUENCES
 from dissectors.bacnet.values import base
 
 _FIELD = re.compile(r"(?:\[(?P<tag>\d+)\])?(?P<optional>\?)?\s*(?P<name>[a-z0-9-]+) (?P<type>\{?[A-Za-z0-9]+\}?)")
+
+ANYTHING = frozenset({"Any", "AnyPrimitive", "AnyApplication"})
+"""Types of values that may be of any type."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,4 +69,4 @@ def choice(type_name: str) -> tuple[LayoutField, ...] | None:
 def exists(type_name: str) -> bool:
     """Whether the tables know the type."""
     bare = type_name[1:-1] if type_name.startswith("{") else type_name
-    return bare == "Any" or base(bare) is not None or bare in SEQUENCES or bare in CHOICES
+    return bare in ANYTHING or base(bare) is not None or bare in SEQUENCES or bare in CHOICES

@@ -3,30 +3,61 @@
 from __future__ import annotations
 
 from dissectors.bacnet.enumerations import BIT_STRINGS, ENUMERATIONS
-from dissectors.bacnet.enumerations_later import NEWER
+from dissectors.bacnet.enumerations_later import NEWER, NEWER_BITS
 
-FIRST_VENDOR: dict[str, int] = {
-    "ObjectType": 128,
-    "PropertyIdentifier": 512,
-    "ErrorClass": 64,
-    "ErrorCode": 256,
-    "EngineeringUnits": 256,
-    "RejectReason": 64,
-    "AbortReason": 64,
-    "EventState": 64,
-    "EventType": 64,
-    "Reliability": 64,
-    "DeviceStatus": 64,
-    "LifeSafetyMode": 256,
-    "LifeSafetyState": 256,
-    "LifeSafetyOperation": 64,
-    "ProgramError": 64,
-    "VTClass": 64,
+VENDORS: dict[str, tuple[range, ...]] = {
+    "AbortReason": (range(64, 256),),
+    "AccessAuthenticationFactorDisable": (range(64, 65536),),
+    "AccessCredentialDisable": (range(64, 65536),),
+    "AccessCredentialDisableReason": (range(64, 65536),),
+    "AccessEvent": (range(512, 65536),),
+    "AccessUserType": (range(64, 65536),),
+    "AccessZoneOccupancyState": (range(64, 65536),),
+    "AuditLevel": (range(128, 256),),
+    "AuditOperation": (range(32, 64),),
+    "AuthorizationException": (range(64, 256),),
+    "AuthorizationMode": (range(64, 65536),),
+    "BinaryLightingPV": (range(64, 256),),
+    "DeviceStatus": (range(64, 65536),),
+    "DoorAlarmState": (range(256, 65536),),
+    "DoorStatus": (range(1024, 65536),),
+    "EngineeringUnits": (range(256, 47808), range(50000, 65536)),
+    "ErrorClass": (range(64, 65536),),
+    "ErrorCode": (range(256, 65536),),
+    "EscalatorFault": (range(1024, 65536),),
+    "EscalatorMode": (range(1024, 65536),),
+    "EscalatorOperationDirection": (range(1024, 65536),),
+    "EventState": (range(64, 65536),),
+    "EventType": (range(64, 65536),),
+    "LifeSafetyMode": (range(256, 65536),),
+    "LifeSafetyOperation": (range(64, 65536),),
+    "LifeSafetyState": (range(256, 65536),),
+    "LiftCarDirection": (range(1024, 65536),),
+    "LiftCarDriveStatus": (range(1024, 65536),),
+    "LiftCarMode": (range(1024, 65536),),
+    "LiftFault": (range(1024, 65536),),
+    "LightingOperation": (range(256, 65536),),
+    "LightingTransition": (range(64, 256),),
+    "LoggingType": (range(64, 256),),
+    "Maintenance": (range(256, 65536),),
+    "NetworkPortCommand": (range(128, 256),),
+    "NetworkType": (range(64, 256),),
+    "ObjectType": (range(128, 1024),),
+    "ProgramError": (range(64, 65536),),
+    "PropertyIdentifier": (range(512, 4194304),),
+    "RejectReason": (range(64, 256),),
+    "Relationship": (range(1024, 65536),),
+    "Reliability": (range(64, 65536),),
+    "RestartReason": (range(64, 256),),
+    "SilencedState": (range(64, 65536),),
+    "VTClass": (range(64, 65536),),
 }
+"""Numbers that vendors may give a meaning of their own; those behind them are the standard's again, or none."""
 
 _TABLES: dict[str, dict[int, str]] = {
     name: {**table, **NEWER.get(name, {}), **table} for name, table in ENUMERATIONS.items()
 }
+_BITS: dict[str, dict[int, str]] = {name: {**NEWER_BITS.get(name, {}), **table} for name, table in BIT_STRINGS.items()}
 _NUMBERS: dict[str, dict[str, int]] = {}
 
 OBJECT_TYPES = _TABLES["ObjectType"]
@@ -60,8 +91,8 @@ def name(enumeration: str | None, number: int) -> str:
     found = known(enumeration, number)
     if found is not None:
         return found
-    first = FIRST_VENDOR.get(enumeration) if enumeration is not None else None
-    return f"vendor-{number}" if first is not None and number >= first else str(number)
+    vendors = VENDORS.get(enumeration, ()) if enumeration is not None else ()
+    return f"vendor-{number}" if any(number in numbers for numbers in vendors) else str(number)
 
 
 def number(enumeration: str, named: str) -> int:
@@ -79,7 +110,7 @@ def number(enumeration: str, named: str) -> int:
 
 def bits(type_name: str) -> dict[int, str] | None:
     """Names of the bits of a bit string type, None for others."""
-    return BIT_STRINGS.get(type_name)
+    return _BITS.get(type_name)
 
 
 def object_type(value: int) -> str:

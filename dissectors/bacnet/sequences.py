@@ -211,7 +211,7 @@ SEQUENCES: dict[str, str] = {
     ),
     "LogMultipleRecord": "[0] timestamp DateTime, [1] log-data LogData",
     "LogRecord": "[0] timestamp DateTime, [1] log-datum LogRecordLogDatum, [2]? status-flags StatusFlags",
-    "NameValue": "[0] name CharacterString, value Any",
+    "NameValue": "[0] name CharacterString, ? value AnyApplication",
     "NameValueCollection": "[0] members {NameValue}",
     "NetworkSecurityPolicy": "[0] port-id Unsigned, [1] security-level SecurityPolicy",
     "NotificationParametersAccessEventType": (
@@ -269,7 +269,7 @@ SEQUENCES: dict[str, str] = {
         "[0] exceeding-value Unsigned, [1] status-flags StatusFlags, [2] deadband Unsigned, [3] exceeded-limit Unsigned"
     ),
     "NotificationParametersUnsignedRange": (
-        "[0] exceeding-value Unsigned, [1] status-flags StatusFlags, [2] exceeding-limit Unsigned"
+        "[0] exceeding-value Unsigned, [1] status-flags StatusFlags, [2] exceeded-limit Unsigned"
     ),
     "ObjectPropertyReference": (
         "[0] object-identifier ObjectIdentifier, [1] property-identifier PropertyIdentifier, [2]? "
@@ -315,7 +315,7 @@ SEQUENCES: dict[str, str] = {
     "SetpointReference": "[0]? setpoint-reference ObjectPropertyReference",
     "SpecialEvent": "period SpecialEventPeriod, [2] list-of-time-values {TimeValue}, [3] event-priority Unsigned",
     "StageLimitValue": "limit Real, values BitString, deadband Real",
-    "TimeValue": "time Time, value Any",
+    "TimeValue": "time Time, value AnyPrimitive",
     "VMACEntry": "[0] virtual-mac-address OctetString, [1] native-mac-address OctetString",
     "VTSession": "local-vt-session-id Unsigned, remote-vt-session-id Unsigned, remote-vt-address DeviceAddress",
     "WhoHasLimits": "[0] device-instance-range-low-limit Unsigned, [1] device-instance-range-high-limit Unsigned",

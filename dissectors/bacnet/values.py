@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dissectors.bacnet import names
-from dissectors.bacnet.dates import Date, Time
+from dissectors.bacnet.dates import Date, Time, week_and_day
 from dissectors.bacnet.station_address import mac_text
 from dissectors.bacnet.tags import Tag
 
@@ -330,9 +330,11 @@ def shortest(value: float) -> float:
 
 
 def show_part(name: str, value: Any, depth: int = 0) -> str:
-    """The value of a named part: station addresses as their network writes them, else as `show` does."""
+    """The value of a named part: station addresses as their network writes them, days of a calendar, else as `show`."""
     if isinstance(value, bytes) and name.endswith("mac-address"):
         return mac_text(value) or "broadcast"
+    if isinstance(value, bytes) and name == "week-n-day":
+        return week_and_day(value) or show(value, depth)
     return show(value, depth)
 
 

@@ -8,7 +8,7 @@ from scapy.fields import BitEnumField, BitField, ByteEnumField, ByteField, Condi
 from scapy.packet import Packet, Raw
 
 from dissectors.bacnet import names
-from dissectors.bacnet.apdu import TITLES
+from dissectors.bacnet.apdu import MAX_APDU, MAX_SEGMENTS, TITLES
 from dissectors.bacnet.packets.tags import Parameters
 
 
@@ -48,8 +48,8 @@ class ConfirmedRequest(_Apdu):
         BitField("segmented_accepted", 0, 1),
         BitField("reserved", 0, 1),
         BitField("reserved_size", 0, 1),
-        BitField("max_segments", 0, 3),
-        BitField("max_apdu", 3, 4),
+        BitEnumField("max_segments", 0, 3, dict(enumerate(MAX_SEGMENTS))),
+        BitEnumField("max_apdu", 3, 4, {code: f"{octets} octets" for code, octets in enumerate(MAX_APDU)}),
         ByteField("invoke_id", 0),
         ConditionalField(ByteField("sequence", 0), _is_segment),
         ConditionalField(ByteField("window", 1), _is_segment),

@@ -33,8 +33,32 @@ MISSPELT = {
     "property-is-not-alist": "property-is-not-a-list",
     "not-abacnet-sc-hub": "not-a-bacnet-sc-hub",
     "http-not-aserver": "http-not-a-server",
+    "performing-abackup": "performing-a-backup",
+    "performing-arestore": "performing-a-restore",
+    "renew-fd-dregistration": "renew-fd-registration",
+    "ansi-x364": "ansi-x3-64",
+    "hp70094": "hp-700-94",
+    "ibm3130": "ibm-3130",
+    "p-h": "ph",
+    "micro-siemens": "microsiemens",
+    "volts-square-hours": "volt-square-hours",
+    "joules-per-hours": "joule-per-hours",
+    "ohm-meter-per-square-meter": "ohm-meter-squared-per-meter",
+    "wiegand37facility": "wiegand37-facility",
+    "facility16card32": "facility16-card32",
+    "facility32card32": "facility32-card32",
+    "fasc-nbcd": "fasc-n-bcd",
+    "fasc-nlarge": "fasc-n-large",
+    "fasc-nlarge-bcd": "fasc-n-large-bcd",
 }
 """Slips in bacpypes3's names, and words that its capitals do not divide."""
+
+RENUMBERED: dict[str, dict[int, str | None]] = {
+    "AbortReason": {64: None, 65: None},  # its own state machine's: from 64 on reasons are the vendors'
+    "LockStatus": {3: None},  # "unknown" there, "unused" in the open BACnet stack, where 4 is unknown
+    "SecurityLevel": {4: "signed-end-to-end", 5: "encrypted-end-to-end"},  # it gives 4 to both
+}
+"""Names that bacpypes3 gives to the wrong number, or to a number whose meaning is not sure (None: no name)."""
 
 
 _PRIMITIVES = (
@@ -120,6 +144,9 @@ REPLACED: dict[str, tuple[tuple[str, str], ...]] = {
             "[22] change-of-timer NotificationParametersChangeOfTimerType",
         ),
     ),
+    "NotificationParametersUnsignedRange": (("[2] exceeding-limit", "[2] exceeded-limit"),),
+    "NameValue": (("value Any", "? value AnyApplication"),),
+    "TimeValue": (("value Any", "value AnyPrimitive"),),
     "PropertyStates": (
         ("[370] write-status", "[37] write-status"),
         (
@@ -171,6 +198,9 @@ def enumerations() -> dict[str, dict[int, str]]:
         for cls in classes
         if isinstance(cls, type) and issubclass(cls, primitive.Enumerated) and cls is not primitive.Enumerated
     }
+    for name, corrected in RENUMBERED.items():
+        entries = {**found[name], **corrected}
+        found[name] = {number: entry for number, entry in entries.items() if entry is not None}
     return dict(sorted(found.items()))
 
 
@@ -246,16 +276,18 @@ def types_by_object() -> dict[int, dict[int, str]]:
 
 
 def property_types() -> tuple[dict[int, str], dict[tuple[int, int], str]]:
-    """Type by property, and by (object type, property) where object types differ from the most common one."""
+    """Type by property, the most common one, and by (object type, property) where object types differ at all.
+
+    What objects without the property would mean by it is not said: its type cannot be told from theirs.
+    """
     by_property = types_by_object()
     common: dict[int, str] = {}
     special: dict[tuple[int, int], str] = {}
     for number, types in sorted(by_property.items()):
         values = list(types.values())
         common[number] = max(sorted(set(values)), key=values.count)
-        for object_type, name in sorted(types.items()):
-            if name != common[number]:
-                special[object_type, number] = name
+        if len(set(values)) > 1:
+            special |= {(object_type, number): name for object_type, name in sorted(types.items())}
     return common, special
 
 
@@ -333,7 +365,8 @@ def render() -> dict[str, str]:
         + plain
         + "}\n\nBY_OBJECT: dict[tuple[int, int], str] = {\n"
         + by_object
-        + '}\n"""(object type, property) where it differs from PROPERTY_TYPES."""\n',
+        + '}\n"""(object type, property) of those properties whose type depends on the object."""\n\n'
+        + "VARYING = frozenset(number for _, number in BY_OBJECT)\n",
     }
 
 

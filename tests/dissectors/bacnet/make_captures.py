@@ -197,10 +197,37 @@ def other_types() -> list[Step]:
     return bus.steps
 
 
+def schedules() -> list[Step]:
+    """A day with three times, days of a calendar, tags with and without values, a present value of a program."""
+    bus = SegmentedBus(Party(3), Party(8))
+    bus.rounds(1)
+    day = tuple({"time": Time(hour, 0, 0, 0), "value": value} for hour, value in ((8, 21.0), (18, 16.5), (22, None)))
+    calendar: tuple[tuple[str, object], ...] = (
+        ("date", Date(126, 12, 25, 5)),
+        ("week-n-day", bytes((255, 6, 5))),
+        ("week-n-day", bytes((2, 1, 255))),
+    )
+    tags = ({"name": "floor", "value": 3}, {"name": "hidden"}, {"name": "zone", "value": "north"})
+    told: tuple[tuple[str, int, int | None, object], ...] = (
+        ("schedule,1", 123, 1, ConstructedValue("DailySchedule", (("day-schedule", day),))),
+        ("calendar,1", 23, None, tuple(ConstructedValue("CalendarEntry", (entry,)) for entry in calendar)),
+        ("device,8", 486, None, tuple(ConstructedValue("NameValue", tuple(tag.items())) for tag in tags)),
+        ("program,1", 85, None, "stopped"),
+    )
+    for invoke, (target, number, index, value) in enumerate(told, 1):
+        about: dict[str, object] = {"object-identifier": target, "property-identifier": number}
+        about |= {} if index is None else {"property-array-index": index}
+        bus.ask(invoke, READ, codec.encode(services.CONFIRMED[READ], about))
+        bus.reply(invoke, READ, codec.encode(services.ACK[READ], {**about, "property-value": value}), at_once=True)
+    bus.rounds(1)
+    return bus.steps
+
+
 CAPTURES: dict[str, Callable[[], list[Step]]] = {
     "mstp-segments": segments,
     "mstp-segments-lost": segments_lost,
     "mstp-behind-routers": behind_routers,
+    "mstp-schedules": schedules,
     "findings/ms-tp-segments-heard-damaged": segments_heard_damaged,
     "findings/ms-tp-confirmed-without-reply-bit": no_reply_bit,
     "findings/ms-tp-dates-that-are-none": wrong_dates,

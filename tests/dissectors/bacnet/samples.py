@@ -77,6 +77,8 @@ class _Maker:
         if type_name == "Any":
             fitting = PROPERTY_TYPES.get(self._property) if self._property in _TYPED else None
             return self.of_type(fitting) if fitting and fitting != "Any" else PLAIN[rng.choice(_ANY)](rng)
+        if type_name in layout.ANYTHING:
+            return PLAIN[rng.choice(_ANY)](rng)
         if type_name == "PropertyIdentifier":
             self._property = rng.choice(_TYPED)
             return Enumerated(self._property, type_name)

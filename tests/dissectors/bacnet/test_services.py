@@ -43,6 +43,9 @@ THEIRS_OTHERWISE = {
 }
 """Parts of events whose layouts are corrected in generate_tables.py; tshark reads ours (test_tshark.py)."""
 
+THEIR_NAMES = {"exceeding-limit": "exceeded-limit"}
+"""Names of parts of theirs that are not the standard's."""
+
 
 def decode_theirs(kind: int, choice: int, octets: bytes) -> Any:
     found = theirs.APDU.decode(PDU(octets))
@@ -65,7 +68,7 @@ def plain(value: Any) -> Any:
         for name in [chosen] if chosen else value._order or value._elements:
             item = getattr(value, name, None)
             if item is not None or chosen:
-                found.append((kebab(name), plain(item)))
+                found.append((THEIR_NAMES.get(kebab(name), kebab(name)), plain(item)))
         return tuple(found)
     if isinstance(value, (list, constructed.Array)):
         return tuple(plain(item) for item in value)
@@ -174,7 +177,7 @@ def plain_service(value: Any) -> Any:
     for name in value._order:
         item = getattr(value, name, None)
         if item is not None:
-            found.append((kebab(name), plain(item)))
+            found.append((THEIR_NAMES.get(kebab(name), kebab(name)), plain(item)))
     return tuple(found)
 
 

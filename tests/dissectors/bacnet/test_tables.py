@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dissectors.bacnet import layout
+from dissectors.bacnet import layout, names
 from dissectors.bacnet.enumerations import BIT_STRINGS, ENUMERATIONS
 from dissectors.bacnet.enumerations_later import NEWER
 from dissectors.bacnet.property_types import BY_OBJECT, PROPERTY_TYPES
@@ -27,6 +27,38 @@ def test_newer_numbers_never_contradict():
     for enumeration, table in NEWER.items():
         assert not set(table) & set(ENUMERATIONS[enumeration])
         assert not set(table.values()) & set(ENUMERATIONS[enumeration].values())
+
+
+def test_no_number_of_the_vendors_has_a_name():
+    """They are each vendor's own: whatever a table calls them was made up by its author."""
+    for enumeration, ranges in names.VENDORS.items():
+        assert not [n for n in names.numbered(enumeration) if any(n in numbers for numbers in ranges)], enumeration
+
+
+@pytest.mark.parametrize(
+    ("enumeration", "number", "name"),
+    [
+        ("AbortReason", 11, "apdu-too-long"),
+        ("AbortReason", 64, "vendor-64"),
+        ("EngineeringUnits", 47807, "vendor-47807"),
+        ("EngineeringUnits", 47813, "47813"),  # the standard's again, and not used
+        ("EngineeringUnits", 50000, "vendor-50000"),
+        ("ObjectType", 1023, "vendor-1023"),
+        ("ObjectType", 1024, "1024"),
+        ("PropertyIdentifier", 4194303, "vendor-4194303"),
+        ("PropertyIdentifier", 4194304, "max-bvlc-length-accepted"),
+        ("PropertyIdentifier", 4200000, "4200000"),
+        ("RestartReason", 64, "vendor-64"),
+        ("SecurityLevel", 5, "encrypted-end-to-end"),
+    ],
+)
+def test_whose_a_number_is(enumeration: str, number: int, name: str):
+    assert names.name(enumeration, number) == name
+
+
+def test_bits_of_object_types_are_the_object_types():
+    bits = names.bits("ObjectTypesSupported")
+    assert bits == names.OBJECT_TYPES
 
 
 def test_every_property_type_is_known():
