@@ -23,6 +23,11 @@ EXCEPTIONS: dict[int, tuple[Severity, str, str]] = {
     4: (Severity.ERROR, "the device failed while it did what was asked", "the device's fault memory"),
     5: (Severity.NOTE, "the device takes long for this and will finish later", "whether the master asks again later"),
     6: (Severity.NOTE, "the device is busy", "how often; let the master ask less often"),
+    7: (
+        Severity.WARNING,
+        "the device cannot do what was asked; older Modicon devices say so of programming",
+        "the request against the device's manual",
+    ),
     8: (Severity.ERROR, "the device found its memory damaged", "replace the device's memory or the device"),
     10: (Severity.WARNING, "a gateway has no path to the target", "the gateway's routes and port settings"),
     11: (Severity.WARNING, "the device behind a gateway does not answer", "that device: supply, address, wiring"),

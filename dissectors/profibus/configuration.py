@@ -2,12 +2,15 @@
 
 general   c w t t n n n n      t 01 input, 10 output, 11 both; n+1 octets, or words with w; c: consistent as a whole
 special   k k 0 0 m m m m      k 00 empty slot, 01 input, 10 output, 11 output and input: a length octet for each,
-                               c w n n n n n n; then m octets of the maker's
+                               c w n n n n n n; then m octets of the maker's, none where m is 15
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+
+_NOT_COMPARED = 15
+"""In place of a number of octets: none follow, and those that the slave has need not be the same."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +47,8 @@ def parse_configuration(data: bytes) -> tuple[Module, ...]:
         if len(named) < lengths:
             break
         behind = at + 1 + lengths
-        end = behind + (octet & 0x0F)
+        makers = octet & 0x0F
+        end = behind + (makers if makers != _NOT_COMPARED else 0)
         if end > len(data):
             break
         modules.append(replace(_special(kinds, named), begin=at, end=end, makers=data[behind:end]))

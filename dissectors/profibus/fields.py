@@ -147,7 +147,8 @@ def _parameters(data: bytes) -> Fields:
     if said is None:
         return _short(Service.SET_PARAMETERS, data, LEAST)
     found: Fields = {"pb.prm.status": said.status, "pb.prm.words": ", ".join(said.words)}
-    if (watchdog := said.watchdog_ms) is not None:
-        found["pb.prm.watchdog_ms"] = watchdog
+    least, most = said.watchdogs_ms or (0, 0)
+    if said.watchdogs_ms is not None and least == most:
+        found["pb.prm.watchdog_ms"] = most
     found |= {"pb.prm.tsdr": said.tsdr, "pb.prm.ident": said.ident, "pb.prm.groups": said.groups}
     return {**found, "pb.prm.user": said.user.hex(" ")} if said.user else found

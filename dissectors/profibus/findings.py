@@ -381,5 +381,5 @@ def _unheard_seen(record: RequestsRecord) -> str:
 
 
 def _watchdog(slave: SlaveView) -> str:
-    watchdog = None if slave.given is None else slave.given.watchdog_ms
-    return "" if watchdog is None else f"; its watchdog is set to {watchdog} ms"
+    watchdog = "" if slave.given is None else slave.given.watchdog_words
+    return f"; its watchdog is set to {watchdog}" if watchdog else ""

@@ -150,11 +150,10 @@ def _parameters(data: bytes, begin: int) -> Nodes:
     said = prm.parse_parameters(data)
     if said is None:
         return _short(data, begin, prm.LEAST)
-    watchdog = said.watchdog_ms
     factors = f"{said.factors[0]} × {said.factors[1]}"
     nodes = [
         _bits("station status", said.status, begin, prm.STATUS),
-        Node("watchdog", "off" if watchdog is None else f"{watchdog} ms ({factors})", begin + 1, begin + 3),
+        Node("watchdog", f"{said.watchdog_words} ({factors})" if said.watchdog_words else "off", begin + 1, begin + 3),
         Node("min TSDR", f"{said.tsdr} bit times" if said.tsdr else "as it is", begin + 3, begin + 4),
         Node("ident number", f"{said.ident:04X}h", begin + 4, begin + 6),
         Node("groups", f"{said.groups:02X}h" if said.groups else "none", begin + 6, begin + 7),

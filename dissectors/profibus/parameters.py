@@ -7,7 +7,7 @@ from dataclasses import dataclass
 LEAST = 7
 WATCHDOG, FREEZE, SYNC, UNLOCK, LOCK = 0x08, 0x10, 0x20, 0x40, 0x80
 STATUS = ((WATCHDOG, "watchdog"), (FREEZE, "freeze"), (SYNC, "sync"), (UNLOCK, "unlock"), (LOCK, "lock"))
-_MILLISECOND_BASE = 0x04  # in the first octet of DP-V1 parameters
+_MILLISECOND_BASE, _DPV1_ENABLED = 0x04, 0x80  # in the first octet of DP-V1 parameters
 CLEAR, UNFREEZE, DO_FREEZE, UNSYNC, DO_SYNC = 0x02, 0x04, 0x08, 0x10, 0x20
 _CONTROLS = ((CLEAR, "clear"), (UNFREEZE, "unfreeze"), (DO_FREEZE, "freeze"), (UNSYNC, "unsync"), (DO_SYNC, "sync"))
 
@@ -24,14 +24,27 @@ class Parameters:
     user: bytes
 
     @property
-    def watchdog_ms(self) -> int | None:
-        """Time after which the slave drops out when its master is silent, ms; None: no watchdog.
+    def watchdogs_ms(self) -> tuple[int, int] | None:
+        """Least and most time after which the slave drops out when its master is silent, ms; None: no watchdog.
 
-        In steps of 10 ms, of 1 ms where the DP-V1 octet behind asks for that.
+        In steps of 10 ms, of 1 ms where the DP-V1 octet behind asks for that. Only the slave's GSD tells whether it is
+        one: of other slaves that octet is the maker's. One that does not enable DP-V1 may be either.
         """
         if not self.status & WATCHDOG:
             return None
-        return self.factors[0] * self.factors[1] * (1 if self.user[:1] and self.user[0] & _MILLISECOND_BASE else 10)
+        steps = self.factors[0] * self.factors[1]
+        first = self.user[0] if self.user else 0
+        if not first & _MILLISECOND_BASE:
+            return 10 * steps, 10 * steps
+        return steps, steps if first & _DPV1_ENABLED else 10 * steps
+
+    @property
+    def watchdog_words(self) -> str:
+        """The same in words: "300 ms"; empty without a watchdog."""
+        if self.watchdogs_ms is None:
+            return ""
+        least, most = self.watchdogs_ms
+        return f"{most} ms" if least == most else f"{most} ms, {least} ms if the slave is of DP-V1"
 
     @property
     def words(self) -> tuple[str, ...]:

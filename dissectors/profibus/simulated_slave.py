@@ -146,8 +146,8 @@ class Slave:
             self._fault = bits.PARAMETER_FAULT
         elif self._master in (NO_MASTER, heard.source):
             self.state, self._fault, self._master = SlaveState.WAIT_CONFIGURATION, 0, heard.source or 0
-            watchdog = given.watchdog_ms
-            self._watchdog, self._heard = None if watchdog is None else watchdog * MS, now
+            watchdogs = given.watchdogs_ms
+            self._watchdog, self._heard = None if watchdogs is None else watchdogs[1] * MS, now
         return bytes((SC,))
 
     def _configured(self, heard: Telegram) -> bytes:

@@ -121,16 +121,16 @@ class SlaveView:
         lost among damaged octets."""
         if self.is_blurred:
             return True
-        watchdog = 0 if self.given is None else self.given.watchdog_ms
-        if watchdog == 0:  # not heard, or none that there can be
+        watchdogs = (0, 0) if self.given is None else self.given.watchdogs_ms
+        if watchdogs == (0, 0):  # not heard, or none that there can be
             return self.silence > max(2 * self.survived, _LEAST_WATCHDOG)
-        return watchdog is not None and self.silence >= watchdog * MS
+        return watchdogs is not None and self.silence >= watchdogs[0] * MS
 
     def is_starved(self, doubt: int) -> bool:
         """Whether nothing but the silence of its master is why it left data exchange just now. `doubt`: ns by which
         times may be off."""
-        watchdog = None if self.given is None else self.given.watchdog_ms
-        return not self.is_blurred and bool(watchdog) and self.silence - doubt >= (watchdog or 0) * MS
+        _, most = (self.given.watchdogs_ms if self.given is not None else None) or (0, 0)
+        return not self.is_blurred and most > 0 and self.silence - doubt >= most * MS
 
     def become(self, state: SlaveState, time: int) -> None:
         """Take a state."""

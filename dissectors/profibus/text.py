@@ -101,10 +101,9 @@ def _parameters(data: bytes) -> str:
     said = parse_parameters(data)
     if said is None:
         return f"too short: {data.hex(' ')}"
-    watchdog = said.watchdog_ms
     parts = [", ".join(said.words) or "no lock", f"ident {said.ident:04X}h"]
-    if watchdog is not None:
-        parts.append(f"watchdog {watchdog} ms")
+    if said.watchdog_words:
+        parts.append(f"watchdog {said.watchdog_words}")
     if said.groups:
         parts.append(f"groups {said.groups:02X}h")
     return "; ".join([*parts, f"user {said.user.hex(' ')}"] if said.user else parts)

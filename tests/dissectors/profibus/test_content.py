@@ -13,6 +13,7 @@ from dissectors.profibus.configuration import parse_configuration
 from dissectors.profibus.diagnosis import parse_blocks
 from dissectors.profibus.dpv1 import device_block, parse_acyclic
 from dissectors.profibus.outline import outline
+from dissectors.profibus.parameters import parse_parameters
 from dissectors.profibus.telegram import telegram
 
 
@@ -71,6 +72,28 @@ def test_parameters_and_configuration_octet_by_octet() -> None:
     assert told["Chk_Cfg/module 1"] == "00: empty slot"
     assert told["Chk_Cfg/module 2"] == "c1 07 05 aa: 6 octets in, 8 octets out, consistent by units, maker's aa"
     assert told["Chk_Cfg/cut off"] == "43"
+    told = lines(request(62, bytes.fromhex("4f 03 21")))  # 15: no octets of the maker's follow, any will do
+    assert told["Chk_Cfg/module 0"] == "4f 03: 4 octets in, consistent by units"
+    assert told["Chk_Cfg/module 1"] == "21: 2 octets out, consistent by units"
+
+
+@pytest.mark.parametrize(
+    ("user", "watchdogs", "words"),
+    [
+        (b"", (300, 300), "300 ms (30 × 1)"),
+        (b"\x80", (300, 300), "300 ms (30 × 1)"),
+        (b"\x84", (30, 30), "30 ms (30 × 1)"),
+        (b"\x04", (30, 300), "300 ms, 30 ms if the slave is of DP-V1 (30 × 1)"),  # else the octet is its maker's
+    ],
+)
+def test_what_a_watchdog_counts_in_only_dp_v1_says(user: bytes, watchdogs: tuple[int, int], words: str) -> None:
+    frame = request(61, bytes((0xB8, 30, 1, 11, 0xF5, 0x10, 5)) + user)
+    given_ = parse_parameters(bytes((0xB8, 30, 1, 11, 0xF5, 0x10, 5)) + user)
+    assert given_ is not None
+    assert given_.watchdogs_ms == watchdogs
+    assert lines(frame)["Set_Prm/watchdog"] == words
+    sure = watchdogs[0] if watchdogs[0] == watchdogs[1] else None
+    assert PROFIBUS.fields(frame, Role.REQUEST).get("pb.prm.watchdog_ms") == sure
 
 
 def test_a_command_to_all_and_to_groups() -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import pytest
+
 from dissectors.findings import Finding, Severity
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings, Timing
@@ -129,6 +131,18 @@ def test_a_slave_whose_master_was_silent_did_not_drop_out_by_itself() -> None:
     unknown = found(judged([*exchanges(4), (1_500, gone[0][1]), gone[1]]), "PB007")  # its watchdog was not heard
     assert unknown is not None
     assert unknown.severity is Severity.NOTE
+
+
+@pytest.mark.parametrize(("first", "master_is_named"), [(0x84, True), (0x04, False)])
+def test_a_master_is_late_for_a_watchdog_by_its_longest_reading(first: int, master_is_named: bool) -> None:
+    """Bit 2 of the first octet of user parameters is 1 ms a step only with a slave of DP-V1; else the maker's."""
+    short = (telegram(5, 1, 0x5D, bytes((0x88, 50, 1, 11, 0xF5, 0x10, 0, first, 0, 0)), 61, 62), bytes((SC,)))
+    came_up = [*diagnosis(), *((1, one) for one in short), *exchanges(6)]
+    left = [(100, telegram(5, 1, 0x7D, b"\0")), (1, telegram(1, 5, 0x03))]
+    judge = judged([*came_up, *left, *exchanges(1)])
+    assert (found(judge, "PB019") is not None) == master_is_named
+    fallen = found(judge, "PB007")
+    assert fallen is None or fallen.severity is Severity.NOTE
 
 
 def test_one_request_and_its_repeats_prove_no_absent_station() -> None:
