@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+from sniff.analysis.json_text import finite
 from sniff.analysis.sanitizing import sanitized
 
 MOST_CHARACTERS = 40_000
@@ -58,7 +59,7 @@ def marked(given: list[Any], left_off: str = "", **facts: Any) -> str:
 
 def as_json(told: dict[str, Any]) -> str:
     """As short as JSON can be."""
-    return json.dumps(told, ensure_ascii=False, separators=(",", ":"))
+    return json.dumps(finite(told), ensure_ascii=False, separators=(",", ":"))
 
 
 def harmless(value: Any) -> Any:

@@ -5,7 +5,6 @@ Keys and their order are a promise. Characters that a terminal obeys are escaped
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from sniff.analysis.json_text import dumps, iso
@@ -43,7 +42,7 @@ def value_record(bus: ToldBus, sample: Sample) -> dict[str, Any]:
         "bus": bus.name,
         "device": sample.station,
         "point": sample.name,
-        "value": finite(value.value),
+        "value": value.value,
         "raw": value.raw,
         "unit": value.unit,
         "quality": int(value.quality),
@@ -71,8 +70,3 @@ def finding_record(told: FindingTold) -> dict[str, Any]:
         "means": one.means,
         "next": one.next,
     }
-
-
-def finite(value: int | float | str) -> int | float | str:
-    """The value; as a text where JSON has no number for it."""
-    return value if isinstance(value, str) or math.isfinite(value) else str(value)

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from dissectors.findings import Severity
 from sniff.analysis.json_text import dumps, iso
 from sniff.analysis.sanitizing import sanitized
-from sniff.outlets.json_lines import finding_record, finite
+from sniff.outlets.json_lines import finding_record
 from sniff.outlets.news import NewsKind
 from sniff.outlets.told import FindingTold, NumbersTold, StateTold, Told, ToldBus, ValueTold
 from sniff.version import __version__
@@ -166,7 +166,7 @@ class Messages:
             },
         )
         content = {
-            "value": finite(value.value),
+            "value": value.value,
             "raw": value.raw,
             "unit": value.unit,
             "quality": int(value.quality),
