@@ -112,7 +112,7 @@ NEWER: dict[str, dict[int, str]] = {
     ),
     "AccessEvent": _table(
         """
-        16 no-entry-after-granted
+        16 no-entry-after-grant
         """
     ),
     "BinaryLightingPV": _table(
@@ -146,11 +146,6 @@ NEWER: dict[str, dict[int, str]] = {
     "LightingOperation": _table(
         """
         11 restore-on 12 default-on 13 toggle-restore 14 toggle-default
-        """
-    ),
-    "NetworkPortCommand": _table(
-        """
-        8 restart-discovery 9 generate-csr-file 10 validate-changes
         """
     ),
     "NetworkType": _table(
