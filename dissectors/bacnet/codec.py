@@ -78,9 +78,11 @@ VALUE_ONLY = "= "
 @dataclass(slots=True)
 class Outline:
     """What the octets of parameters are. `tags`: of each tag "property-identifier: present-value (85)", or its value
-    alone after `VALUE_ONLY`, by its place; `groups`: the records that several tags make, by begin and end."""
+    alone after `VALUE_ONLY`, by its place; `groups`: the records that several tags make, by begin and end; `elements`:
+    the index of each element of a property that came whole, by where it begins."""
 
     tags: dict[int, str] = made(default_factory=dict)
+    elements: dict[int, int] = made(default_factory=dict)
     groups: dict[int, dict[int, ConstructedValue]] = made(default_factory=dict)
 
 
@@ -93,13 +95,18 @@ class _Scope:
     property: int | None = None
     index: int | None = None
     names: Outline | None = None  # for those who ask
+    whole: bool = False  # the value of a property, in which a list is all of its elements
 
     def inner(self) -> _Scope:
         return _Scope(self.wrong, self.object, self.property, self.index, self.names)
 
     def of_value(self) -> _Scope:
         """Inside a value other properties are spoken of."""
-        return _Scope(self.wrong, names=self.names)
+        return _Scope(self.wrong, names=self.names, whole=self.index is None)
+
+    def count(self, tag: Tag, index: int) -> None:
+        if self.names is not None and self.whole:
+            self.names.elements.setdefault(tag.start, index)
 
     def group(self, tags: Sequence[Tag], record: ConstructedValue) -> None:
         if self.names is not None and len(tags) > 1:
@@ -237,13 +244,15 @@ def _in_place(type_name: str, tags: Sequence[Tag], at: int, scope: _Scope, depth
         end = _end_of_anything(type_name, tags, at)
         return _any(tags[at:end], scope, depth), end
     if type_name.startswith("{"):
-        item, values = type_name[1:-1], []
+        item = type_name[1:-1]
+        values: list[Any] = []
         while at < len(tags):
             value, after = _in_place(item, tags, at, scope, depth + 1)
             if after == at:
                 raise _Misfit(f"{item} has no tags")
             if base(item) is not None:
                 scope.name_value(tags[at], value)
+            scope.count(tags[at], len(values) + 1)
             values.append(value)
             at = after
         return tuple(values), at

@@ -47,7 +47,7 @@ def test_a_correct_segmented_answer_is_one_answer_and_its_list_is_there():
     assert line(found, 10).startswith("5 → 1 read-property ack segment 1, last of 2: device,5 object-list = [analog-")
     shown = values(found, 10)
     assert shown["frames"] == ["3, 10"]
-    assert shown["[59]"] == ["analog-value,59"]
+    assert shown["[60]"] == ["analog-value,59"]  # the 60th element
     assert str(MSTP.fields(frame(found, 10), Role.RESPONSE)["bacapp.instance_number"]).endswith(",58,59")
 
 

@@ -20,6 +20,9 @@ from dissectors.bacnet.values import ConstructedValue, Enumerated, ObjectId, esc
 from dissectors.meaning import Node
 
 _UNITS, _PRESENT = 117, 85
+_FIRST = "[1]"
+"""Of several that have no name: BACnet counts from 1."""
+
 _LONGEST = 200
 """Characters of a value in a line of the tree."""
 
@@ -45,36 +48,42 @@ def _nodes(tags: Sequence[Tag], outline: Outline, depth: int, units: str = "", w
         begin = tags[at].start
         ends = [end for end in outline.groups.get(begin, {}) if places.get(end, -1) > at and (at or end != within)]
         if not ends or depth > tagging.DEPTH_MAX:
-            found.append(_tag(tags[at], outline, depth, units, len(found)))
+            index = outline.elements.get(begin) if at or within is None else None  # else that of the whole record
+            found.append(_tag(tags[at], outline, depth, units, len(found) + 1, index))
             at += 1
             continue
         end, last = max(ends), places[max(ends)] + 1
         record = outline.groups[begin][end]
         below = _nodes(tags[at:last], outline, depth + 1, _units(record) or units, end)
-        name, text = _record(record, units, len(found))
+        name, text = _record(record, units)
+        number = outline.elements.get(begin, 0 if name else len(found) + 1)
+        name = f"[{number}] {name or _words(record.type or 'record')}" if number else name
         found.append(Node(name, text, begin, end, tuple(below)))
         at = last
     return found
 
 
-def _tag(tag: Tag, outline: Outline, depth: int, units: str, place: int) -> Node:
+def _tag(tag: Tag, outline: Outline, depth: int, units: str, place: int, index: int | None) -> Node:
     said = outline.tags.get(tag.start, "")
     name, _, text = ("", "", said.removeprefix(VALUE_ONLY)) if said.startswith(VALUE_ONLY) else said.partition(": ")
     if tag.children is None:
         text = text or show_tag(tag)
-        return Node(name or f"[{place}]", _short(text), tag.start, tag.end)
+        which = name if index is None else f"[{index}] {name}".rstrip()
+        return Node(which or f"[{place}]", _short(text), tag.start, tag.end)
+    name = name or f"[{tag.number}]"
+    name = name if index is None else f"[{index}] {name}"
     children = _nodes(tag.children, outline, depth + 1, units)
     only = children[0] if len(children) == 1 else None
-    if only is not None and not only.children and only.name == "[0]":  # one value in its brackets
-        return Node(name or f"[{tag.number}]", only.text, tag.start, tag.end)
-    if only is not None and only.children and only.name.startswith("[0]"):  # one record in its brackets
-        return Node(name or f"[{tag.number}]", only.text, tag.start, tag.end, only.children)
-    count = f"{len(children)} values" if len(children) != 1 and any(c.name == "[0]" for c in children) else ""
-    return Node(name or f"[{tag.number}]", count, tag.start, tag.end, tuple(children))
+    if only is not None and not only.children and only.name == _FIRST:  # one value in its brackets
+        return Node(name, only.text, tag.start, tag.end)
+    if only is not None and only.children and only.name.startswith(_FIRST + " "):  # one record in its brackets
+        return Node(name, only.text, tag.start, tag.end, only.children)
+    count = f"{len(children)} values" if len(children) != 1 and any(c.name == _FIRST for c in children) else ""
+    return Node(name, count, tag.start, tag.end, tuple(children))
 
 
-def _record(record: ConstructedValue, units: str, place: int) -> tuple[str, str]:
-    """What a record is about: an object, a property with its value, else its type."""
+def _record(record: ConstructedValue, units: str) -> tuple[str, str]:
+    """What a record is about: an object, a property with its value; no name where it is about neither."""
     thing = next((value for _, value in record if isinstance(value, ObjectId)), None)
     which = record.get("property-identifier")
     if which is not None:
@@ -83,7 +92,7 @@ def _record(record: ConstructedValue, units: str, place: int) -> tuple[str, str]
         return name, _short(f"{text} {units}" if units and text and which.value == _PRESENT else text)
     if thing is not None:
         return str(thing).replace(",", " "), ""
-    return f"[{place}] {_words(record.type or 'record')}", _short(show(record))
+    return "", _short(show(record))
 
 
 def _about(nodes: Sequence[Node]) -> tuple[str, str] | None:

@@ -8,7 +8,8 @@ import pytest
 
 from dissectors.bacnet import codec, services
 from dissectors.bacnet.dates import Date, Time, week_and_day
-from dissectors.bacnet.values import ConstructedValue, show
+from dissectors.bacnet.packets.outlines import outlined
+from dissectors.bacnet.values import ConstructedValue, ObjectId, show
 
 
 def read_back(target: str, number: int, value: Any) -> codec.Decoded:
@@ -65,3 +66,32 @@ def test_days_of_a_calendar_in_words(octets: str, words: str):
     entry = ConstructedValue("CalendarEntry", (("week-n-day", bytes.fromhex(octets)),))
     assert show(entry) == f"week-n-day={words}"
     assert (week_and_day(bytes.fromhex(octets)) or octets) == words
+
+
+@pytest.mark.parametrize(
+    ("target", "number", "value", "names"),
+    [
+        ("device,1", 76, (ObjectId(8, 1), ObjectId(0, 1)), ["[1]", "[2]"]),
+        ("analog-output,1", 87, (*({"null": None} for _ in range(7)), {"real": 21.0}), ["[7] null", "[8] real"]),
+        ("schedule,1", 123, (DAY, DAY), ["[1] day-schedule", "[2] day-schedule"]),
+        (
+            "device,1",
+            486,
+            tuple(sequence("NameValue", name=n, value=1) for n in "ab"),
+            ["[1] name value", "[2] name value"],
+        ),
+    ],
+)
+def test_elements_of_arrays_stand_under_the_number_that_asks_for_them(
+    target: str, number: int, value: Any, names: list[str]
+):
+    about = {"object-identifier": target, "property-identifier": number, "property-value": ()}
+    octets = codec.encode(services.ACK[12], {**about, "property-value": elements(number, value)})
+    outline = codec.Outline()
+    codec.decode(services.ACK[12], octets, outline)
+    (top,) = outlined(octets, outline)
+    assert [node.name for node in top.children[-1].children][-2:] == names
+
+
+def elements(number: int, value: Any) -> Any:
+    return tuple(ConstructedValue("PriorityValue", tuple(one.items())) for one in value) if number == 87 else value
