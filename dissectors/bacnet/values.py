@@ -201,6 +201,7 @@ def base(type_name: str) -> str | None:
     return "BitString" if names.bits(type_name) is not None else None
 
 
+_JIS = b"\x1b$B"
 _CHARSETS = {0: "utf-8", 3: "utf-32-be", 4: "utf-16-be", 5: "latin-1"}
 
 
@@ -212,6 +213,8 @@ def text(octets: bytes) -> str:
         page = int.from_bytes(octets[1:3], "big")
         codec = {850: "cp850", 932: "cp932", 936: "cp936", 949: "cp949", 950: "cp950"}.get(page, "latin-1")
         return octets[3:].decode(codec, "replace")
+    if octets[0] == 2:  # JIS X 0208: two octets a character, without the escapes that texts have around it
+        return (_JIS + octets[1:]).decode("iso2022_jp", "replace")
     return octets[1:].decode(_CHARSETS.get(octets[0], "latin-1"), "replace")
 
 

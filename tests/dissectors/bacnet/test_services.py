@@ -267,6 +267,7 @@ def test_strings_in_every_character_set():
         (4, "Größe".encode("utf-16-be"), "Größe"),
         (3, "Größe".encode("utf-32-be"), "Größe"),
         (5, "Größe".encode("latin-1"), "Größe"),
+        (2, bytes.fromhex("30214027"), "亜是"),
     ):
         body = bytes((charset,)) + octets
         found = codec.plain(tags.Tag(7, False, body))
