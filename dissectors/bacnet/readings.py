@@ -20,6 +20,7 @@ from dissectors.readings import Origin, Reading
 PRESENT_VALUE = 85
 READ_PROPERTY, _READ_MULTIPLE, WRITE_PROPERTY, _WRITE_MULTIPLE = 12, 14, 15, 16
 _CONFIRMED_COV, _UNCONFIRMED_COV = 1, 2
+_CONFIRMED_COV_MULTIPLE, _UNCONFIRMED_COV_MULTIPLE = 31, 11
 
 
 def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ...]:
@@ -125,6 +126,11 @@ def _change(record: ConstructedValue) -> Iterator[Item]:
         yield record["monitored-object-identifier"], item, item["value"], Origin.REPORT
 
 
+def _changes(record: ConstructedValue) -> Iterator[Item]:
+    for notification in record["list-of-cov-notifications"]:
+        yield from _change(notification)
+
+
 _TELLERS: dict[tuple[int, int], Any] = {
     (PduType.COMPLEX_ACK, READ_PROPERTY): _property(Origin.READ),
     (PduType.COMPLEX_ACK, _READ_MULTIPLE): _read_multiple,
@@ -132,6 +138,8 @@ _TELLERS: dict[tuple[int, int], Any] = {
     (PduType.CONFIRMED_REQUEST, _WRITE_MULTIPLE): _write_multiple,
     (PduType.CONFIRMED_REQUEST, _CONFIRMED_COV): _change,
     (PduType.UNCONFIRMED_REQUEST, _UNCONFIRMED_COV): _change,
+    (PduType.CONFIRMED_REQUEST, _CONFIRMED_COV_MULTIPLE): _changes,
+    (PduType.UNCONFIRMED_REQUEST, _UNCONFIRMED_COV_MULTIPLE): _changes,
 }
 
 TELLING = frozenset(_TELLERS)

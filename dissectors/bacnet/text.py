@@ -229,10 +229,9 @@ def _i_am(record: ConstructedValue) -> str:
 
 def _cov(record: ConstructedValue) -> str:
     values = ", ".join(f"{reference(item)}={_value(item['value'])}" for item in record["list-of-values"])
-    return (
-        f"{record['initiating-device-identifier']} {record['monitored-object-identifier']} {values} "
-        f"remaining {record['time-remaining']} s"
-    )
+    remaining = record["time-remaining"]
+    until = f"remaining {remaining} s" if remaining else "without end"  # of a subscription that was not made, too
+    return f"{record['initiating-device-identifier']} {record['monitored-object-identifier']} {values} {until}"
 
 
 _WRITERS: dict[tuple[bool, int], Any] = {

@@ -17,6 +17,7 @@ from dissectors.bacnet.f510 import f510
 from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.questions import question
 from dissectors.bacnet.readings import asks, readings
+from dissectors.bacnet.text import parameters_text
 from dissectors.bacnet.values import Double, Enumerated, shortest, show
 from dissectors.frame import Check, FoundBy, Frame
 
@@ -84,6 +85,45 @@ def test_change_of_value() -> None:
         ("analog-input", 4, 59.9, "report", "", DRIVE),
         ("analog-input", 4, 1, "report", "status-flags", DRIVE),
     ]
+
+
+def test_changes_of_several_objects_at_once() -> None:
+    values = {
+        "subscriber-process-identifier": 1,
+        "initiating-device-identifier": "device,510",
+        "time-remaining": 60,
+        "list-of-cov-notifications": [
+            {
+                "monitored-object-identifier": f"analog-input,{number}",
+                "list-of-values": [{"property-identifier": "present-value", "value": float(number)}],
+            }
+            for number in (4, 5)
+        ],
+    }
+    layout = services.parameters(1, 11)
+    assert layout is not None
+    npdu = b"\x01\x00" + apdus.encode(1, service=11) + codec.encode(layout, values)
+    found = readings(frame(DRIVE, 255, npdu), None)
+    assert [(r.address, r.value, r.how.value, r.station) for r in found] == [
+        (4, 4.0, "report", DRIVE),
+        (5, 5.0, "report", DRIVE),
+    ]
+
+
+@pytest.mark.parametrize(("seconds", "words"), [(0, "without end"), (60, "remaining 60 s")])
+def test_a_subscription_of_no_time_has_no_end(seconds: int, words: str) -> None:
+    values = {
+        "subscriber-process-identifier": 1,
+        "initiating-device-identifier": "device,510",
+        "monitored-object-identifier": "analog-input,4",
+        "time-remaining": seconds,
+        "list-of-values": [{"property-identifier": "present-value", "value": 59.9}],
+    }
+    layout = services.parameters(1, 2)
+    assert layout is not None
+    apdu = apdus.decode(apdus.encode(1, service=2))
+    assert apdu is not None
+    assert parameters_text(apdu, codec.decode(layout, codec.encode(layout, values))).endswith(f"=59.9 {words}")
 
 
 def test_tokens_tell_nothing() -> None:
