@@ -27,6 +27,7 @@ from dissectors.bacnet.values import (
     base,
     primitive,
     show,
+    show_held,
     show_part,
 )
 
@@ -123,6 +124,10 @@ class _Scope:
     def name_value(self, tag: Tag, value: Any) -> None:
         if self.names is not None:
             self.name(tag, f"{VALUE_ONLY}{show(value)}")
+
+    def name_held(self, tag: Tag, value: Any) -> None:
+        if self.names is not None and self.property is not None:
+            self.name(tag, f"{VALUE_ONLY}{show_held(self.property, self.index, value)}")
 
     def note(self, field: LayoutField, value: Any) -> None:
         if isinstance(value, ObjectId) and field.name != "initiating-device-identifier":
@@ -317,7 +322,7 @@ def _any(tags: Sequence[Tag], scope: _Scope, depth: int) -> Any:
         try:
             value, used = _in_place(expected, tags, 0, scope.of_value(), depth + 1)
             if len(tags) == 1 and base(expected) is not None:
-                scope.name_value(tags[0], value)
+                scope.name_held(tags[0], value)
             if used == len(tags) and (used or expected.startswith("{")):
                 return value
         except _Misfit:

@@ -13,7 +13,7 @@ from dissectors.bacnet.frame_types import PROPRIETARY, FrameType
 from dissectors.bacnet.header import error_text
 from dissectors.bacnet.limits import BROADCAST
 from dissectors.bacnet.station_address import remote
-from dissectors.bacnet.values import ConstructedValue, escape, show, show_tag
+from dissectors.bacnet.values import ConstructedValue, escape, show_held, show_part, show_tag
 
 if TYPE_CHECKING:
     from dissectors.bacnet.codec import Decoded
@@ -158,7 +158,7 @@ def parameters_text(apdu: Apdu, decoded: Decoded) -> str:
         except (KeyError, TypeError, AttributeError):  # not all parameters are there
             line = ""
     if not line:
-        line = " ".join(f"{name}={show(value)}" for name, value in record)
+        line = " ".join(f"{name}={show_part(name, value)}" for name, value in record)
     if decoded.wrong:
         line += f" ({decoded.wrong[0].found}, not {decoded.wrong[0].expected})"
     if decoded.rest:
@@ -177,14 +177,14 @@ def reference(record: ConstructedValue) -> str:
 def _property(record: ConstructedValue) -> str:
     line = f"{record['object-identifier']} {reference(record)}"
     if "property-value" in record:
-        line += f" = {_value(record['property-value'])}"
+        line += f" = {_held(record, record['property-value'])}"
     if record.get("priority") is not None:
         line += f" priority {record['priority']}"
     return line
 
 
-def _value(value: Any) -> str:
-    return show(value)
+def _held(record: ConstructedValue, value: Any) -> str:
+    return show_held(record["property-identifier"].value, record.get("property-array-index"), value)
 
 
 def _read_multiple(record: ConstructedValue) -> str:
@@ -201,7 +201,7 @@ def _read_multiple(record: ConstructedValue) -> str:
 
 def _result(item: ConstructedValue) -> str:
     ((kind, value),) = item["read-result"].entries
-    shown = _value(value)
+    shown = _held(item, value)
     if kind == "property-access-error":
         shown = f"error {value['error-class']} {value['error-code']}"
     return f"{reference(item)}={shown}"
@@ -210,7 +210,7 @@ def _result(item: ConstructedValue) -> str:
 def _write_multiple(record: ConstructedValue) -> str:
     return "; ".join(
         f"{spec['object-identifier']} "
-        + ", ".join(f"{reference(item)}={_value(item['value'])}" for item in spec["list-of-properties"])
+        + ", ".join(f"{reference(item)}={_held(item, item['value'])}" for item in spec["list-of-properties"])
         for spec in record["list-of-write-access-specs"]
     )
 
@@ -228,9 +228,9 @@ def _i_am(record: ConstructedValue) -> str:
 
 
 def _cov(record: ConstructedValue) -> str:
-    values = ", ".join(f"{reference(item)}={_value(item['value'])}" for item in record["list-of-values"])
+    values = ", ".join(f"{reference(item)}={_held(item, item['value'])}" for item in record["list-of-values"])
     remaining = record["time-remaining"]
-    until = f"remaining {remaining} s" if remaining else "without end"  # of a subscription that was not made, too
+    until = ("remaining " if remaining else "") + show_part("time-remaining", remaining)
     return f"{record['initiating-device-identifier']} {record['monitored-object-identifier']} {values} {until}"
 
 

@@ -14,6 +14,7 @@ from typing import Any
 
 from dissectors.bacnet import names
 from dissectors.bacnet.dates import Date, Time, week_and_day
+from dissectors.bacnet.fixed_units import ENDLESS, OF_PARAMETERS, OF_PROPERTIES
 from dissectors.bacnet.station_address import mac_text
 from dissectors.bacnet.tags import Tag
 
@@ -333,12 +334,22 @@ def shortest(value: float) -> float:
 
 
 def show_part(name: str, value: Any, depth: int = 0) -> str:
-    """The value of a named part: station addresses as their network writes them, days of a calendar, else as `show`."""
+    """The value of a named part: station addresses as their network writes them, days of a calendar, numbers with the
+    unit that the standard fixes for them, else as `show`."""
     if isinstance(value, bytes) and name.endswith("mac-address"):
         return mac_text(value) or "broadcast"
     if isinstance(value, bytes) and name == "week-n-day":
         return week_and_day(value) or show(value, depth)
+    if name in OF_PARAMETERS and isinstance(value, int | float):
+        return "without end" if name in ENDLESS and not value else f"{show(value)} {OF_PARAMETERS[name]}"
     return show(value, depth)
+
+
+def show_held(which: int, index: int | None, value: Any) -> str:
+    """What a property, or an element of it, holds: numbers with the unit that the standard fixes for it."""
+    unit = OF_PROPERTIES.get(which) if index != 0 else None  # element 0 is how many there are
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return f"{show(value)} {unit}" if unit is not None and is_number else show(value)
 
 
 def show_tag(tag: Tag, depth: int = 0) -> str:

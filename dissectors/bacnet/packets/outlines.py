@@ -16,7 +16,7 @@ from collections.abc import Iterable, Sequence
 from dissectors.bacnet import tags as tagging
 from dissectors.bacnet.codec import VALUE_ONLY, Outline, plain
 from dissectors.bacnet.tags import Tag
-from dissectors.bacnet.values import ConstructedValue, Enumerated, ObjectId, escape, show, show_tag
+from dissectors.bacnet.values import ConstructedValue, Enumerated, ObjectId, escape, show, show_held, show_tag
 from dissectors.meaning import Node
 
 _UNITS, _PRESENT = 117, 85
@@ -119,15 +119,16 @@ def _value_of(record: ConstructedValue) -> str | None:
         ((kind, value),) = result.entries
         if kind == "property-access-error" and isinstance(value, ConstructedValue):
             return "error: " + " ".join(str(part) for _, part in value)
-        return _plain(value)
+        return _held(record, value)
     for name in ("property-value", "value"):
         if name in record:
-            return _plain(record[name])
+            return _held(record, record[name])
     return None
 
 
-def _plain(value: object) -> str:
-    return show(plain(value)) if isinstance(value, Tag) else show(value)
+def _held(record: ConstructedValue, value: object) -> str:
+    held = plain(value) if isinstance(value, Tag) else value
+    return show_held(record["property-identifier"].value, record.get("property-array-index"), held)
 
 
 def _units(record: ConstructedValue) -> str:
