@@ -13,6 +13,7 @@ from dissectors.bacnet.envelope import npdu_frame
 from dissectors.bacnet.fields import fields as mstp_fields
 from dissectors.bacnet.header import peek as peek_mstp
 from dissectors.bacnet.ip_framing import ENDS, IP_NAME
+from dissectors.bacnet.ip_functions import FUNCTIONS, function_fields, function_text, function_types
 from dissectors.bacnet.message import read
 from dissectors.bacnet.readings import asks as mstp_asks
 from dissectors.bacnet.readings import readings as mstp_readings
@@ -25,23 +26,6 @@ from dissectors.meaning import Meaning
 from dissectors.numbered_exchanges import NumberedExchanges
 from dissectors.readings import Reading
 from dissectors.tracker import NOTHING_TRACKED, Placement, Tracked, Transaction, Verdict
-
-FUNCTIONS = {
-    0x00: "result",
-    0x01: "write broadcast distribution table",
-    0x02: "read broadcast distribution table",
-    0x03: "broadcast distribution table",
-    0x04: "forwarded NPDU",
-    0x05: "register foreign device",
-    0x06: "read foreign device table",
-    0x07: "foreign device table",
-    0x08: "delete foreign device",
-    0x09: "distribute broadcast to network",
-    0x0A: "original unicast NPDU",
-    0x0B: "original broadcast NPDU",
-    0x0C: "secure BVLL",
-}
-"""Annex J.2."""
 
 _NPDU_AT = {0x04: 10, 0x09: 4, 0x0A: 4, 0x0B: 4}
 _BROADCASTS = (0x04, 0x09, 0x0B)
@@ -95,7 +79,9 @@ def ip_text(frame: Frame, header: Header, role: Role) -> str:
     if same is not None:
         return f"{mstp_text(same, header, role)}{_behind(frame)}"
     error = f" [{header.error}]" if header.error else ""
-    return f"{header.source} → {header.destination} {header.kind.replace('-', ' ')}{error}{_behind(frame)}"
+    whole = frame.ok and len(frame.octets) >= ENDS + 4
+    says = function_text(frame.octets[ENDS + 1], frame.octets[ENDS + 4 :]) if whole else ""
+    return f"{header.source} → {header.destination} {header.kind.replace('-', ' ')}{says}{error}{_behind(frame)}"
 
 
 def ip_meant(frame: Frame, header: Header, role: Role, meaning: Meaning) -> str:
@@ -120,6 +106,8 @@ def ip_fields(frame: Frame, role: Role) -> Fields:
     for name, begin, end in (("type", 0, 1), ("function", 1, 2), ("length", 2, 4)):
         if len(octets) >= ENDS + end:
             found[f"bvlc.{name}"] = int.from_bytes(octets[ENDS + begin : ENDS + end], "big")
+    if len(octets) > ENDS + 4:
+        found |= function_fields(octets[ENDS + 1], octets[ENDS + 4 :])
     same = twin(frame)
     told = mstp_fields(same, role) if same is not None else {}
     return found | {name: value for name, value in told.items() if not name.startswith("mstp.")}
@@ -135,6 +123,7 @@ def ip_types() -> FieldTypes:
         "bvlc.type": FieldType(Kind.NUMBER, "81 for IP"),
         "bvlc.function": FieldType(Kind.NUMBER, "what it is", {name: code for code, name in FUNCTIONS.items()}),
         "bvlc.length": FieldType(Kind.NUMBER, "octets of the datagram"),
+        **function_types(),
         **{name: kind for name, kind in types().items() if not name.startswith("mstp.")},
     }
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import ClassVar
 
-from scapy.fields import ByteEnumField, ConditionalField, IPField, ShortField, XByteField
+from scapy.fields import ByteEnumField, ConditionalField, IPField, ShortEnumField, ShortField, XByteField
 from scapy.packet import Packet, Raw
 
-from dissectors.bacnet.ip import FUNCTIONS, twin
+from dissectors.bacnet.ip import twin
+from dissectors.bacnet.ip_functions import FUNCTIONS, RESULTS
 from dissectors.bacnet.packets import NPDU
 from dissectors.frame import Frame
 
-_FORWARDED = 0x04
+_RESULT, _FORWARDED, _REGISTER = 0x00, 0x04, 0x05
 
 
 class BVLC(Packet):  # type: ignore[misc]
@@ -29,6 +30,8 @@ class BVLC(Packet):  # type: ignore[misc]
         ShortField("length", None),
         ConditionalField(IPField("origin", "0.0.0.0"), lambda packet: packet.function == _FORWARDED),
         ConditionalField(ShortField("origin_port", 47808), lambda packet: packet.function == _FORWARDED),
+        ConditionalField(ShortEnumField("result", 0, RESULTS), lambda packet: packet.function == _RESULT),
+        ConditionalField(ShortField("seconds", 0), lambda packet: packet.function == _REGISTER),
     ]
 
     def post_build(self, pkt: bytes, pay: bytes) -> bytes:

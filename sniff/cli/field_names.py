@@ -101,15 +101,19 @@ def check_names(names: Iterable[str]) -> None:
             continue
         if name in POINT_TYPES:
             raise Failure(f"-e {name}: a row may have many; it is for filters (-Y), and `points` lists values", USAGE)
-        silent = tuple(prefix for one in registry.usable() if not types_of(one) for prefix in one.prefixes)
-        known = [field for one in registry.usable() for field in types_of(one)]
+        protocols = (*registry.usable(), *registry.relatives())
+        silent = tuple(prefix for one in protocols if not types_of(one) for prefix in one.prefixes)
+        known = [field for one in protocols for field in types_of(one)]
         if name not in known and not (silent and name.startswith(silent)):
             hint = nearest(name, [*JSON_KEYS, *COLUMN_TYPES, *ALIASES, *known])
             raise Failure(f"-e {name}: unknown field ({hint}); --help-fields lists them", USAGE)
 
 
 def field_lines(protocols: list[Dissector]) -> Iterable[str]:
-    """Every field: its name, its type, what it says and its words."""
+    """Every field: its name, its type, what it says and its words. Of a relative on networks, behind others: what none
+    of them has.
+    """
+    listed: set[str] = set()
     yield "of every protocol"
     for name in COLUMN_TYPES:
         yield from _lines(name, column_type(name, protocols[0]))
@@ -125,8 +129,9 @@ def field_lines(protocols: list[Dissector]) -> Iterable[str]:
         if not types:
             yield f"  fields begin with {', '.join(one.prefixes)}; their types are not declared"
         for name, type in types.items():
-            if name not in COLUMN_TYPES:
+            if name not in COLUMN_TYPES and not (name in listed and one.name in registry.RELATIVES):
                 yield from _lines(name, type)
+        listed |= set(types)
 
 
 def _lines(name: str, type: FieldType) -> Iterable[str]:

@@ -206,7 +206,7 @@ class _HelpFields(argparse.Action):
         from sniff.cli.field_names import field_lines
 
         try:
-            protocols = [registry.get(values)] if values else list(registry.usable())
+            protocols = [registry.get(values)] if values else [*registry.usable(), *registry.relatives()]
         except registry.UnknownProtocol as error:
             raise Failure(str(error), USAGE) from None
         for line in field_lines(protocols):

@@ -104,3 +104,26 @@ def test_everything_is_total(octets: bytes, damaged: bool, role: Role) -> None:
     BACNET_IP.fields(frame, role)
     assert bytes(BACNET_IP.packet(frame, role)) == octets
     BACNET_IP.tracker(TIMING).track(0, frame, header)
+
+
+def test_what_a_datagram_says_without_an_npdu() -> None:
+    def said(function: int, content: str) -> tuple[str, dict[str, object]]:
+        (frame,) = frames_of(make_ip(HERE, THERE, function, bytes.fromhex(content)))
+        told = {name: value for name, value in BACNET_IP.fields(frame, Role.DATA).items() if name.startswith("bvlc.")}
+        assert bytes(BACNET_IP.packet(frame, Role.DATA)) == frame.octets
+        text = BACNET_IP.text(frame, BACNET_IP.peek(frame), Role.DATA).partition("  ")[0]
+        return text.partition(" → 9 ")[2], told
+
+    text, told = said(0x00, "0030")
+    assert (text, told["bvlc.result"]) == ("result: register foreign device refused", 0x30)
+    assert said(0x00, "0000")[0] == "result: done"
+    assert said(0x00, "1234")[0] == "result: code 1234h"
+    text, told = said(0x05, "003c")
+    assert (text, told["bvlc.reg_ttl"]) == ("register foreign device for 60 s", 60)
+    assert said(0x08, "c0000209bac0")[0] == "delete foreign device 192.0.2.9:47808"
+    assert said(0x03, "c0000209bac0ffffff00")[0] == ("broadcast distribution table: 192.0.2.9:47808 mask 255.255.255.0")
+    assert said(0x07, "c0000209bac0003c001e")[0] == "foreign device table: 192.0.2.9:47808 for 60 s, 30 s left"
+    assert said(0x07, "")[0] == "foreign device table: empty"
+    assert said(0x00, "00") == ("result", {"bvlc.type": 0x81, "bvlc.function": 0, "bvlc.length": 5})
+    forwarded = said(0x04, "c0000207bac0" + "0120ffff00ff1008")[1]
+    assert (forwarded["bvlc.fwd_ip"], forwarded["bvlc.fwd_port"]) == ("192.0.2.7", 47808)

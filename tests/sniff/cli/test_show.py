@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.sniff.formats.packets_made import as_pcap, udp
+
 CAPTURES = Path(__file__).parents[3] / "captures"
 
 KEYS = [
@@ -267,3 +269,14 @@ def test_what_only_filters_have_is_no_unknown_field(sniff485: Callable) -> None:
     assert ran.code == 2
     assert "unknown" not in ran.err
     assert "-Y" in ran.err
+
+
+def test_fields_of_relatives_on_networks_are_known(tmp_path: Path, sniff485: Callable) -> None:
+    here, there = (bytes((192, 0, 2, 1)), 47808), (bytes((192, 0, 2, 9)), 47808)
+    path = as_pcap(tmp_path / "x.pcap", [(1, udp(here, there, bytes.fromhex("81050006003c")))])
+    ran = sniff485("show", path, "-T", "fields", "-e", "bvlc.function", "-e", "bvlc.reg_ttl")
+    assert (ran.code, ran.out) == (0, "5\t60\n")
+    listed = sniff485("show", "--help-fields").out
+    assert listed.count(" bvlc.function ") == 1
+    assert listed.count(" bacapp.type ") == 1
+    assert " bacapp.type " in sniff485("show", "--help-fields=bacnet-ip").out
