@@ -155,6 +155,12 @@ def specifier(octet: int) -> list[str]:
     return [*told, f"number {octet >> 3}"]
 
 
+_STATUS_TYPES = {
+    0x81: "status message",
+    0x83: "state of links between slaves",
+    0x9E: "acknowledged parameter command",
+    0x9F: "redundancy state",
+}
 _PDU_STATES = ("good", "data invalid", "wrong module", "no module")
 
 
@@ -167,8 +173,8 @@ def device_block(content: bytes) -> str | None:
     rest = f": {content[3:].hex(' ')}" if len(content) > 3 else ""
     if kind in ALARM_TYPES:
         return ", ".join((ALARM_TYPES[kind], f"slot {slot}", *specifier(octet))) + rest
-    if kind == 0x81:
-        return ", ".join(("status message", f"slot {slot}", *([SPECIFIERS[octet & 3]] if octet & 3 else []))) + rest
+    if kind in _STATUS_TYPES:
+        return ", ".join((_STATUS_TYPES[kind], f"slot {slot}", *([SPECIFIERS[octet & 3]] if octet & 3 else []))) + rest
     if kind == 0x82:
         states = [octet >> shift & 3 for octet in content[3:] for shift in (0, 2, 4, 6)]
         bad = [f"slot {at} {_PDU_STATES[state]}" for at, state in enumerate(states, 1) if state]

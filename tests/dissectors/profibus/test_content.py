@@ -148,6 +148,8 @@ def test_alarms_in_a_device_block_are_said_with_a_doubt() -> None:
     frame = answer(60, bytes((0x08, 0x0C, 0, 2, 0xF5, 0x10, 0x05, 0x01, 0x04, 0x0D, 0x77)))
     assert "device: 01 04 0d 77 (if of DP-V1: diagnosis alarm, slot 4, appears, with a further" in said(frame)
     assert device_block(b"\x82\x00\x00\x06") == "module status: slot 1 wrong module, slot 2 data invalid"
+    assert device_block(b"\x83\x00\x00\x05\x80") == "state of links between slaves, slot 0: 05 80"
+    assert device_block(b"\x9f\x00\x01") == "redundancy state, slot 0, appears"
 
 
 @given(
