@@ -153,6 +153,11 @@ NEWER: dict[str, dict[int, str]] = {
         8 non-bacnet 11 secure-connect
         """
     ),
+    "SuccessFilter": _table(
+        """
+        0 all 1 successes-only 2 failures-only
+        """
+    ),
 }
 
 NEWER_BITS: dict[str, dict[int, str]] = {

@@ -55,7 +55,7 @@ VENDORS: dict[str, tuple[range, ...]] = {
 """Numbers that vendors may give a meaning of their own; those behind them are the standard's again, or none."""
 
 _TABLES: dict[str, dict[int, str]] = {
-    name: {**table, **NEWER.get(name, {}), **table} for name, table in ENUMERATIONS.items()
+    name: ENUMERATIONS.get(name, {}) | NEWER.get(name, {}) for name in (*ENUMERATIONS, *NEWER)
 }
 _BITS: dict[str, dict[int, str]] = {name: {**NEWER_BITS.get(name, {}), **table} for name, table in BIT_STRINGS.items()}
 _NUMBERS: dict[str, dict[str, int]] = {}

@@ -40,13 +40,13 @@ SEQUENCES: dict[str, str] = {
     "AuditLogQueryParametersBySource": (
         "[0] source-device-identifier ObjectIdentifier, [1]? source-device-address Address, [2]? "
         "source-object-identifier ObjectIdentifier, [3]? operations AuditOperationFlags, [4] "
-        "successful-actions-only Boolean"
+        "successful-actions-only SuccessFilter"
     ),
     "AuditLogQueryParametersByTarget": (
         "[0] target-device-identifier ObjectIdentifier, [1]? target-device-address Address, [2]? "
         "target-object-identifier ObjectIdentifier, [3]? target-property-identifier PropertyIdentifier, [4]? "
         "target-array-index Unsigned, [5]? target-priority Unsigned, [6]? operations AuditOperationFlags, [7] "
-        "successful-actions-only Boolean"
+        "successful-actions-only SuccessFilter"
     ),
     "AuditLogRecord": "[0] timestamp DateTime, [1] log-datum AuditLogRecordLogDatum",
     "AuditLogRecordResult": "[0] sequence-number Unsigned, [1] log-record AuditLogRecord",

@@ -145,6 +145,8 @@ REPLACED: dict[str, tuple[tuple[str, str], ...]] = {
         ),
     ),
     "NotificationParametersUnsignedRange": (("[2] exceeding-limit", "[2] exceeded-limit"),),
+    "AuditLogQueryParametersBySource": (("actions-only Boolean", "actions-only SuccessFilter"),),
+    "AuditLogQueryParametersByTarget": (("actions-only Boolean", "actions-only SuccessFilter"),),
     "NameValue": (("value Any", "? value AnyApplication"),),
     "TimeValue": (("value Any", "value AnyPrimitive"),),
     "PropertyStates": (

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from dissectors.bacnet import codec, layout, names, services, tags
 from dissectors.bacnet.choices import CHOICES
 from dissectors.bacnet.dates import Date, Time
-from dissectors.bacnet.values import BitString, ConstructedValue, Enumerated, ObjectId
+from dissectors.bacnet.values import BitString, ConstructedValue, Enumerated, ObjectId, show
 from tests.dissectors.bacnet.generate_tables import kebab
 from tests.dissectors.bacnet.samples import LAYOUTS, SEEDS, WITH_PARAMETERS, apdu_of, parameters_of
 
@@ -295,3 +295,11 @@ def test_lengths_in_all_their_forms(size: int):
     assert tag.octets == content
     their_tag = primitive.TagList.decode(PDU(octets))[0]
     assert bytes(their_tag.tag_data) == content
+
+
+def test_a_query_of_an_audit_log_may_be_for_failures_only():
+    octets = bytes.fromhex("0c0f400001 1e 0e 0c02000001 7902 0f 1f 3901")
+    found = codec.decode(services.CONFIRMED[33], octets)
+    assert not found.wrong
+    query = found.record["query-parameters"]
+    assert show(query["by-target"]["successful-actions-only"]) == "failures-only"
