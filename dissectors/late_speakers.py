@@ -245,7 +245,7 @@ class LateSpeaker:
 def told(one: LateSpeaker) -> str:
     """What is seen of a late speaker, in words."""
     words = f"{counted(one.window.damage.count, 'damaged frame')} while its answer was overdue"
-    if one.of_elsewhere:
+    if one.of_elsewhere and one.struck:  # else those that are hit are heard too seldom to be compared
         words += f": {one.struck} of {one.of} then, of the same senders {one.elsewhere} of {one.of_elsewhere} elsewhere"
     hits = ["requests"] if not one.hit.isdisjoint((MASTER, NOBODY)) else []
     hit = sorted(one.stations_hit)

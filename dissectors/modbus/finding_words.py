@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from math import floor, log10, sqrt
 
-from dissectors.findings import Severity
+from dissectors.findings import Finding, Severity
 from dissectors.modbus.station_record import Key
 
 
@@ -47,3 +48,13 @@ def units(units: Iterable[int]) -> str:
 def note_if(condition: bool) -> Severity | None:
     """The severity of what is not worth more than a note; None, the rule's own, for all else."""
     return Severity.NOTE if condition else None
+
+
+def of_few(finding: Finding) -> Finding:
+    """The finding of so little damage that nothing tells whose it is: one station's, or that of the line."""
+    return replace(
+        finding,
+        means="noise on this station's drop, or anywhere on the line: too few to tell which",
+        next="whether it comes again, and with whom; then that station's connector and stub, or termination, bias and "
+        "ground",
+    )

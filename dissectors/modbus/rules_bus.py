@@ -10,7 +10,7 @@ from dissectors.late_speakers import MASTER
 from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.damage_shares import DamageShare, shares_of_damage, to_blame
-from dissectors.modbus.finding_words import note_if, request_words, units
+from dissectors.modbus.finding_words import note_if, of_few, request_words, units
 from dissectors.modbus.odd_ends import OddEnd
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.rules_late import of_impatience, of_late_speakers, under_late_answers
@@ -350,10 +350,10 @@ def _common_damage(seen: BusRecord, damage: DamageShare) -> list[Finding]:
     words = f"{answers} of {counted(asked, 'answer')} of {units(struck)} damaged ({percent(answers / max(1, asked))})"
     if "master" in hits:
         words += f", and {counted(hits['master'], 'request')}"
-    words += (
-        ": of each about as much as it sends" if len(hits) > 1 else ": too few, and too close together, to say whose"
-    )
-    return [replace(tally.found(RULES["MB007"], "bus", words, note_if(seen.rare(damaged, asked))), count=answers)]
+    among = len(hits) > 1
+    words += ": of each about as much as it sends" if among else ": too few, and too close together, to say whose"
+    finding = tally.found(RULES["MB007"], "bus", words, note_if(seen.rare(damaged, asked)))
+    return [replace(finding if among else of_few(finding), count=answers)]
 
 
 def _cycle(seen: BusRecord) -> Iterator[Finding]:

@@ -71,10 +71,11 @@ ANSWER_RULES = (
     Rule(
         "MB007",
         Severity.WARNING,
-        "damage whoever sends",
+        "damage that names no sender",
         "At least three damaged frames, none of whose senders has a greater part in them than its part of all octets "
         "sent explains (95% confidence). Up to four in a row of one sender, with no whole answer between, count as "
-        "one: a master repeats into the same disturbance. So a single stretch of damage is nobody's own.",
+        "one: a master repeats into the same disturbance. So a single stretch of damage is nobody's own; where "
+        "it fell on one sender alone, nothing tells whether others are struck.",
         "a cause common to all: termination, bias, ground, cable, or noise near the master",
         "120 Ω at both ends only, one bias, the shield grounded once; then halve the line to find the place",
         explains=("MB002", "MB005", "MB009", "MB104"),

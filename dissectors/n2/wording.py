@@ -9,6 +9,7 @@ from dissectors.chances import at_least, is_rare
 from dissectors.findings import Finding, Severity, Tally, counted, times, together
 from dissectors.frame import Flaw
 from dissectors.line import MS, NS_PER_S
+from dissectors.n2 import meanings
 from dissectors.n2.blame import blamed
 from dissectors.n2.commands import error_name
 from dissectors.n2.masters import HASTE, Masters
@@ -95,7 +96,7 @@ def worded(heard: N2Evidence) -> Iterator[Finding]:
         yield masters.damaged.found(RULES["N2007"], "bus", seen)
     if heard.stray.count:
         seen = f"{counted(heard.stray.count, 'answer')} came unasked"
-        finding = heard.stray.found(RULES["N2011"], "bus", seen)
+        finding = meanings.of_unasked_answers(heard.stray.found(RULES["N2011"], "bus", seen))
         yield heard.noted_if(heard.is_rare(heard.stray, heard.master.frames), finding)
     yield from _alike(heard)
     yield from _damaged(heard)
@@ -121,14 +122,17 @@ def _damaged(heard: N2Evidence) -> Iterator[Finding]:
     """Damaged frames, at their sender or at the bus."""
     senders = _senders(heard)
     frames = sum(sent.frames for sent in senders.values())
-    for subject, tally in blamed(senders, heard.strikes).items():
+    found = blamed(senders, heard.strikes)
+    among = [name for name, one in senders.items() if one.bad.count and name not in found]
+    for subject, tally in found.items():
         of = senders[subject].frames if subject in senders else frames
         what = {"bus": "frame", "master": "command"}.get(subject, "answer")
         seen = f"{counted(tally.count, f'damaged {what}')} of {of}"
+        is_everybodys = subject == "bus" and len(among) > 1 and tally.count >= ALIKE
         if subject == "bus":
-            several = sum(one.bad.count > 0 for one in senders.values()) > 1
-            seen += ", of all senders as long as they send" if several else ", too few to say whose they are"
-        yield heard.noted_if(heard.is_rare(tally, of), tally.found(RULES["N2004"], subject, seen))
+            seen += ", of each sender about as much as it sends" if is_everybodys else "; too few to say whose they are"
+        finding = meanings.of_damage(tally.found(RULES["N2004"], subject, seen), is_everybodys=is_everybodys)
+        yield heard.noted_if(heard.is_rare(tally, of), finding)
 
 
 _OF_DRIVERS = frozenset(Flaw) - {Flaw.CHECK_SWAPPED, Flaw.ONE_SPOILT, Flaw.ONE_MISSING}
@@ -153,14 +157,14 @@ def _alike(heard: N2Evidence) -> Iterator[Finding]:
         tally.evidence = sorted(frame for one in tallies for frame in one.evidence)
         whose = "all stations" if len(stations) > 1 else f"{stations[0]}, the only one heard: its own or a converter's"
         seen = f"{_flaw_words(flaw)} in {counted(tally.count, 'answer')} of {whose}"
-        yield tally.found(RULES["N2012"], "bus", seen)
+        yield meanings.of_flaw(tally.found(RULES["N2012"], "bus", seen), flaw, of_all=len(stations) > 1)
         found = {name: flaw for name, flaw in found.items() if name not in stations}
     for name, flaw in found.items():
         sent, tally = senders[name], senders[name].flaws[flaw]
         what = "command" if name == "master" else "answer"
         seen = f"{_flaw_words(flaw)} in {tally.count} of {counted(sent.frames, what)}"
         severity = Severity.ERROR if 2 * tally.count >= sent.frames else Severity.WARNING
-        yield tally.found(RULES["N2012"], name, seen, severity)
+        yield meanings.of_flaw(tally.found(RULES["N2012"], name, seen, severity), flaw)
 
 
 def _flaw(sent: Damages) -> Flaw | int | None:
@@ -262,11 +266,11 @@ def _missing(heard: N2Evidence, name: str, station: N2StationRecord) -> Finding:
 
 def _of_station(heard: N2Evidence, name: str, station: N2StationRecord, is_told: bool) -> Iterable[Finding]:
     if station.resets.count:
-        seen = f"answered N00 {times(station.refused_while_reset)}: {times(station.resets.count)} reset"
+        seen = f"answered N00 {times(station.refused_while_reset)}: {counted(station.resets.count, 'reset')}"
         yield station.resets.found(RULES["N2001"], name, seen)
     elif station.resets_told.count:
-        seen = f"{times(station.resets_told.count)} reset, as its master had told it to"
-        yield station.resets_told.found(RULES["N2001"], name, seen, Severity.NOTE)
+        seen = f"reset {times(station.resets_told.count)}, as its master had told it to"
+        yield meanings.of_ordered_reset(station.resets_told.found(RULES["N2001"], name, seen, Severity.NOTE))
     yield from _points(name, station)
     if station.slow.count:
         yield _slow(heard, name, station)
@@ -280,7 +284,8 @@ def _of_station(heard: N2Evidence, name: str, station: N2StationRecord, is_told:
     for (code, title), tally in sorted(station.refused.items()):
         words = f"N{code} {error_name(code)}".rstrip()
         seen = f"{title} refused {times(tally.count)}: {words}" + ("; it obeys nothing" if is_all else "")
-        yield tally.found(RULES["N2009"], name, seen, Severity.WARNING if is_all else None)
+        finding = tally.found(RULES["N2009"], name, seen, Severity.WARNING if is_all else None)
+        yield meanings.of_refusal(finding, code)
     if station.again.count:
         yield station.again.found(RULES["N2010"], name, f"identified again {times(station.again.count)}")
 
@@ -364,5 +369,5 @@ def _again(heard: N2Evidence, name: str, station: N2StationRecord) -> Iterator[F
         yield heard.noted_if(heard.is_rare(station.repeated, station.answered), finding)
     if station.late.count:
         seen = f"{counted(station.late.count, 'answer')} came after the master had gone on"
-        finding = station.late.found(RULES["N2011"], name, seen)
+        finding = meanings.of_late_answers(station.late.found(RULES["N2011"], name, seen))
         yield heard.noted_if(heard.is_rare(station.late, station.answered), finding)

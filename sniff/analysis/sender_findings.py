@@ -15,6 +15,7 @@ from dissectors.findings import Finding, Severity, Tally, counted, together
 from dissectors.frame import Event, Frame, LineError, Mark, Noise
 from dissectors.line import Timing
 from dissectors.strikes import Strikes
+from dissectors.subject import as_subject
 from sniff.analysis.breaks import Breaks
 from sniff.analysis.flag_runs import FlagRuns
 from sniff.analysis.line_rules import LINE_RULES as RULES
@@ -250,13 +251,25 @@ class Senders:
         return finding
 
     def _wrong_everywhere(self, struck: dict[str, Sender], note_if: NoteIf) -> Finding:
-        """One finding in place of one for each sender."""
+        """One finding in place of one for each sender. Where a single one is known to be struck, too seldom to name it,
+        nothing shows that all are."""
         tally = together(self._wrong(record) for record in struck.values())
-        counts = {"unknown" if name == BUS else name: self._wrong(one).count for name, one in struck.items()}
-        each = ", ".join(f"{name} {count}" for name, count in counts.items())
-        words = f"parity or framing errors in {tally.count} of {self.frames} frames, whoever sends ({each})"
+        counts = {name: self._wrong(one).count for name, one in struck.items()}
+        known = sorted(counts.keys() - {BUS}, key=_in_order)
+        each = ", ".join(f"{name}: {counts[name]}" for name in known)
+        words = f"parity or framing errors in {tally.count} of {counted(self.frames, 'frame')}"
+        words += f"{', whoever sends' if len(known) > 1 else ''} ({each}"
+        words += f", unknown: {counts[BUS]})" if BUS in counts else ")"
+        words += ": too few to say whether it alone is struck" if len(counts) == 1 else ""
+        found = tally.found(RULES["LN101"], BUS, words, note_if(tally.count, self.frames))
+        if len(known) == 1:
+            return replace(
+                found,
+                means="noise somewhere on the line, weak levels from this sender, or two that send at once",
+                next="whether it comes again, and with whom; then that sender's connector, termination, bias, ground",
+            )
         return replace(
-            tally.found(RULES["LN101"], BUS, words, note_if(tally.count, self.frames)),
+            found,
             means="a cause common to all: termination, bias, ground, cable, or noise at the tap",
             next="120 Ω at both ends only, one bias, the shield grounded once; the tap's own wires",
         )
@@ -306,6 +319,12 @@ class Senders:
 def _are_many(many: int, senders: Iterable[Sender]) -> bool:
     both = [(one.marked, one.good) for one in senders]
     return many * sum(marked for marked, _ in both) > sum(good for _, good in both)
+
+
+def _in_order(name: str) -> tuple[bool, int]:
+    """The master first, then stations by their address."""
+    about = as_subject(name)
+    return about.station is not None, about.station or 0
 
 
 def _place(frame: Frame, mark: Mark) -> str:

@@ -97,10 +97,12 @@ def _of_all(
     parts = {"LN201": "before", "LN202": "after", "LN203": "away from"}
     spread = ", ".join(f"{among[one].count} {word}" for one, word in parts.items() if one in among and among[one].count)
     finding = _stray_finding(code, BUS, values, tally, senders.frames, note_if)
+    beside = {name for code in names for name in names[code] if name != BUS}
+    whoever = ", whoever sends" if len(beside) > 1 else ""  # beside the frames of one alone it may be that one's
     if sum(one.count > 0 for one in among.values()) > 1:
-        finding = replace(finding, seen=f"{finding.seen}: {spread} frames, whoever sends")
+        finding = replace(finding, seen=f"{finding.seen}: {spread} frames{whoever}")
     elif code != "LN203":
-        finding = replace(finding, seen=f"{finding.seen}, whoever sends")
+        finding = replace(finding, seen=f"{finding.seen}{whoever}")
     octets = Counter({value: count for (_, value), count in values.items()})
     if code == "LN202" and 10 * tally.count >= 9 * senders.frames and len(octets) == 1 and not octets.keys() & LEVELS:
         finding = replace(
