@@ -280,7 +280,7 @@ def _from_the_root(finding: Finding, by_key: Mapping[tuple[str, str], Finding], 
 
 def _told_once(findings: list[Finding], rules: Mapping[str, Rule]) -> tuple[Finding, ...]:
     """The same findings; those whose trouble another one tells that stands for itself (`Rule.told_by`) name it."""
-    standing = [one for one in findings if one.cause is None and one.severity >= Severity.WARNING]
+    standing = [one for one in findings if one.cause is None and one.severity >= Severity.NOTE]
     made: list[Finding] = []
     for finding in findings:
         is_open = finding.cause is None and not finding.is_told_apart and finding.code in rules

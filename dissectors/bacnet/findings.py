@@ -54,8 +54,8 @@ _SIMPLE: tuple[tuple[str, RingEventKind, int, str], ...] = (
     ("MS105", RingEventKind.REJOINED, 1, "answered a Poll For Master {times} though it had been in the ring"),
     ("MS107", RingEventKind.SELF_TOKEN, 1, "passed the token to itself {times}"),
     ("MS301", RingEventKind.NO_REPLY, 1, "no answer to {requests}"),
-    ("MS304", RingEventKind.BROADCAST_REQUEST, 1, "sent a broadcast that expects a reply {times}"),
-    ("MS404", RingEventKind.ILLEGAL, 1, "sent a forbidden address or length {times}"),
+    ("MS304", RingEventKind.BROADCAST_REQUEST, 1, "{times} sent a broadcast that expects a reply"),
+    ("MS404", RingEventKind.ILLEGAL, 1, "{times} sent a frame with a forbidden address or length"),
 )
 """Rules that only count: code, kind of event, from how many on, what was seen."""
 

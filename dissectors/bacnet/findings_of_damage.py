@@ -126,7 +126,9 @@ def duplicates(ring: Ring) -> Iterable[Remark]:
             )
             evidence = evidence.merge(soon)
         if reasons:
-            yield of("MS501", mac, "; ".join(reasons), evidence)
+            remark = of("MS501", mac, "; ".join(reasons), evidence)
+            hit = {address for address, one in ring.nodes.items() if one.damaged}  # two tokens run into everybody
+            yield remark._replace(finding=replace(remark.finding, stations=tuple(sorted({mac, *hit}))))
         elif other.count:
             seen = f"devices {listed(node.devices)} said I-Am from this address, one after the other"
             yield of("MS501", mac, seen, other, Severity.NOTE)

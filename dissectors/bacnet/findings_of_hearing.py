@@ -30,9 +30,10 @@ def hearing(ring: Ring) -> Iterable[Remark]:
     mute = {mac: happened for mac, happened in unheard.items() if _is_mute(ring, mac, happened)}
     others = {mac: happened for mac, happened in unheard.items() if mac not in mute}
     if mute:
-        seen = f"not heard once, though others went on as after its frames {times(_total(mute))}"
+        seen = f"nothing of it is heard, though others went on as after its frames {times(_total(mute))}"
         if len(mute) > 1:
-            seen = f"MAC {listed(sorted(mute))} {seen.replace(' its ', ' their ')}"
+            seen = f"nothing of MAC {listed(sorted(mute))} is heard, though others went on as after their frames "
+            seen += times(_total(mute))
         yield of("MS406", next(iter(mute)) if len(mute) == 1 else None, seen, _together(mute))
     if others:
         total = _total(others)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 
 from dissectors.bacnet.limits import MAX_MASTER, N_POLL
 from dissectors.bacnet.ring import Ring, RingNode, lies_between
@@ -46,7 +46,7 @@ def _shut_out(ring: Ring, mac: int, node: RingNode, by: int, following: int, rou
     seen = (
         f"got its last token{first}; since then {rounds} rounds without a token or a poll for it: "
         f"MAC {by} passes the token on to MAC {following} and polls "
-        f"{f'only {listed(polled)}' if polled else 'nobody'}, never {_between(by, following)}"
+        f"{f'only {listed(polled)}' if polled else 'nobody'}, never {_unpolled(by, following, polled)}"
     )
     return plain("MS110", ring, mac, seen, rounds)
 
@@ -77,6 +77,15 @@ def _skipped_by(ring: Ring, mac: int, node: RingNode) -> tuple[int, int, int] | 
     return None
 
 
-def _between(by: int, following: int) -> str:
-    first, last = (by + 1) % (MAX_MASTER + 1), (following - 1) % (MAX_MASTER + 1)
-    return str(first) if first == last else f"{first} … {last}"
+def _unpolled(by: int, following: int, polled: Container[int]) -> str:
+    """The addresses between the two that are not polled, as stretches: "42 … 127, 0 … 5"."""
+    stretches: list[list[int]] = []
+    for step in range(1, (following - by) % (MAX_MASTER + 1) or MAX_MASTER + 1):
+        address = (by + step) % (MAX_MASTER + 1)
+        if address in polled:
+            continue
+        if stretches and address == stretches[-1][-1] + 1:
+            stretches[-1][1:] = [address]
+        else:
+            stretches.append([address])
+    return ", ".join(" … ".join(map(str, stretch)) for stretch in stretches)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from dissectors.bacnet.findings_of_hearing import hasty, unheard_share
 from dissectors.bacnet.limits import MAX_MASTER, T_ALL_SILENT
 from dissectors.bacnet.ring import Ring
 from dissectors.bacnet.ring_events import Happened, RingEventKind
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
-from dissectors.findings import Severity, counted, times
+from dissectors.findings import Finding, Severity, counted, times
 
 STRAYS_SHARE = 0.2
 """Of a second token is spoken where it shows itself so many times for each frame that the tap did not hear."""
@@ -61,7 +62,18 @@ def silences(ring: Ring) -> Iterable[Remark]:
         )
     if seen:
         both = lost.merge(all_silent)
-        yield of("MS101", None, "; ".join(seen), both, Severity.WARNING if both.count > 1 else Severity.NOTE)
+        remark = of("MS101", None, "; ".join(seen), both, Severity.WARNING if both.count > 1 else Severity.NOTE)
+        yield remark if lost.count else remark._replace(finding=_of_all_silent(remark.finding))
+
+
+def _of_all_silent(finding: Finding) -> Finding:
+    """What is found of silences in which no token was lost: no holder is asked about."""
+    return replace(
+        finding,
+        means="something stopped all stations at once: their supply, or a line that was held or interrupted; or only "
+        "this tap heard nothing: its adapter, its computer",
+        next="the supply of the stations at that time; what the computer and the adapter of this tap did then",
+    )
 
 
 def _lost(happened: Happened, whose: str) -> str:

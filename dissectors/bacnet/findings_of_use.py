@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from dissectors.bacnet.limits import N_POLL, T_USAGE_DELAY, T_USAGE_TIMEOUT_MAX
+from dissectors.bacnet.limits import N_POLL, T_USAGE_DELAY
 from dissectors.bacnet.ring import Ring, RingNode
 from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.bacnet.ring_questions import T_GO_ON
@@ -12,6 +12,7 @@ from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain, 
 from dissectors.bacnet.rules import RULES
 from dissectors.findings import Severity, as_consequence, counted, times
 from dissectors.line import NS_PER_S
+from dissectors.words import percent
 
 POLLS_SHARE = 0.1
 LEAST_POLLS = 20
@@ -112,8 +113,7 @@ def _waits(ring: Ring) -> Iterable[Remark]:
             seen = (
                 f"{happened.count} of {counted(waited.count, 'time')} it went on before the station that it "
                 "polled could "
-                f"answer; median {measured(waited.quantile(0.5))}, {measured(T_USAGE_TIMEOUT_MAX)} at "
-                "most are usual"
+                f"answer; median {measured(waited.quantile(0.5))}, 20 … 35 ms are usual"
             )
             yield of("MS204", mac, seen, happened)
 
@@ -161,11 +161,11 @@ def _slow_rounds(ring: Ring) -> Iterable[Remark]:
         return
     users = sorted(ring.masters, key=lambda mac: -ring.nodes[mac].held)[:3]
     shares = ", ".join(
-        f"MAC {mac} {ring.nodes[mac].held / max(1, ring.span):.0%} with up to "
-        f"{counted(ring.nodes[mac].most_in_a_hold, 'frame')} a token"
+        f"MAC {mac} ({percent(ring.nodes[mac].held / max(1, ring.span), 0)} of the time, up to "
+        f"{counted(ring.nodes[mac].most_in_a_hold, 'frame')} each)"
         for mac in users
     )
-    seen = f"95% of the rounds took up to {measured(max(slow.values()))}; most of the time had {shares}"
+    seen = f"95% of the rounds took up to {measured(max(slow.values()))}; the token was longest with {shares}"
     yield plain("MS108", ring, None, seen, len(slow))
 
 

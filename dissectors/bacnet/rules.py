@@ -13,7 +13,7 @@ _ALL = (
     Rule(
         "MS101",
         Severity.ERROR,
-        "lost token",
+        "lost token, or silence",
         "Nothing was sent for 500 ms (Tno_token) and then a station began anew: the token was lost "
         "(ASHRAE 135, 9.5.6). It looks for a successor then: where the ring goes on with anything else, no token was "
         "lost. The one with the lowest address begins first, 10 ms (Tslot) per address later, so that a silence of "
@@ -62,6 +62,7 @@ _ALL = (
         "A station that had been in the ring answered a Poll For Master, so its neighbour had given it up before.",
         "it resets, loses power, or misses its token again and again",
         "its supply, its connection, and the tokens repeated to it",
+        explains=("MS301",),
     ),
     Rule(
         "MS106",
@@ -91,7 +92,7 @@ _ALL = (
         "with those who have the token longest.",
         "too many stations, too low a baud rate, large Max_Info_Frames, or slow stations",
         "the use time of each station, and how many frames each sends on one token",
-        explains=("MS603",),
+        explains=("MS603", "LN401"),
     ),
     Rule(
         "MS109",
@@ -289,6 +290,7 @@ _ALL = (
         "More than one octet in 200 belongs to no frame.",
         "weak bias: the idle line floats when drivers switch off",
         _WIRING,
+        told_by=("LN201", "LN202", "LN203"),
     ),
     Rule(
         "MS404",
@@ -362,7 +364,7 @@ _ALL = (
         "More than 20 broadcasts a second for ten seconds and more.",
         "a loop of routers, a program that searches for devices without pause, or COV sent to everybody",
         "who sends them and what they are; whether two routers join the same networks",
-        explains=("MS108", "MS603"),
+        explains=("MS108", "MS603", "LN401", "LN402"),
     ),
     Rule(
         "MS603",
@@ -371,6 +373,7 @@ _ALL = (
         "Data take nine tenths of the time, and a round takes five times as long as an idle one.",
         "as much is asked as the line can carry: whatever is added makes all slower",
         "what is asked how often; the baud rate; a second segment",
+        told_by=("LN401",),
     ),
 )
 

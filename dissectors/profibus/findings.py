@@ -19,7 +19,7 @@ from dissectors.profibus.slave_watch import SlaveView
 from dissectors.profibus.watch import BusWatch, Notice
 from dissectors.subject import BUS, Subject, station
 from dissectors.tracker import Placement, Transaction, Verdict
-from dissectors.words import duration, milliseconds
+from dissectors.words import duration, milliseconds, percent
 
 _ALIKE_LEAST = 5
 _BAD_KEPT = 64  # damaged telegrams whose exchange is not over
@@ -298,7 +298,9 @@ class ProfibusFindings:
         )
         if is_one and worst is not None:
             asked = self.records[worst].requests
-            seen = f"{answers[worst].count} of {asked} answers damaged, {damaged.count} telegrams in all"
+            seen = f"{answers[worst].count} of {asked} answers damaged"
+            others_damaged = damaged.count - answers[worst].count
+            seen += f", and {counted(others_damaged, 'other telegram')} on the bus" if others_damaged > 0 else ""
             yield answers[worst].found(RULES["PB008"], station(worst), seen, _grave(answers[worst].count, asked))
         else:
             seen = f"{damaged.count} of {checked} telegrams (tokens aside) damaged"
@@ -322,8 +324,9 @@ class ProfibusFindings:
                 often = tally.count >= _SHARE * self._told[address]
                 yield tally.found(RULES["PB015"], BUS, seen, Severity.ERROR if often else Severity.NOTE)
             elif what is Notice.MASTER_SILENT:
-                seen = f"asked nothing for longer than the watchdog of its slaves {times(tally.count)}; they left then"
-                yield tally.found(RULES["PB019"], station(address), seen, None if tally.count > 1 else Severity.NOTE)
+                seen = f"{times(tally.count)} it asked nothing for longer than its slaves' watchdog; they left then"
+                silent = tally.found(RULES["PB019"], station(address), seen, None if tally.count > 1 else Severity.NOTE)
+                yield replace(silent, stations=(address, *self._starved(tally.count)))
             elif what is Notice.CLEAR:
                 yield tally.found(RULES["PB012"], station(address), self._clear_seen(address))
             elif what is Notice.CLEAR_PERHAPS and (Notice.CLEAR, address) not in self._noted:
@@ -334,8 +337,9 @@ class ProfibusFindings:
         for address, view in sorted(ring.masters.items()):
             if view.polls > view.answered:
                 tally = Tally(view.polls - view.answered, ring.first, ring.last)
-                share = ring.wasted / ring.span if ring.span else 0
-                seen = f"{tally.count} of {view.polls} polls found nobody; all masters' take {share:.1%} of the time"
+                seen = f"{tally.count} of {view.polls} polls found nobody"
+                if ring.wasted_share is not None:
+                    seen += f"; all masters' take {percent(ring.wasted_share)} of the time"
                 yield tally.found(RULES["PB016"], station(address), seen)
 
     def _of_kept(self) -> Iterator[Finding]:
@@ -352,6 +356,12 @@ class ProfibusFindings:
         finding = tally.found(RULES["PB021"], station(kept.master), f"{seen}took up to {duration(kept.usual)}")
         yield replace(finding, count=1)
 
+    def _starved(self, most: int) -> tuple[int, ...]:
+        """Slaves that left data exchange `most` times at most, and never without somebody else's doing."""
+        often = {address: tally.count for (what, address), tally in self._noted.items() if what is Notice.STARVED}
+        dropped = {address for what, address in self._noted if what is Notice.DROP}
+        return tuple(sorted(address for address, count in often.items() if count <= most and address not in dropped))
+
     def _held_seen(self) -> str:
         """Who had the tokens that were lost, where it was one and the same again and again."""
         held = self.watch.claimed_from
@@ -363,7 +373,8 @@ class ProfibusFindings:
         woken = sorted(address for (what, address) in self._noted if what is Notice.WOKE)
         if not woken:
             return ""
-        return f"; silent with the token until then, and going on as if it still had it: {', '.join(map(str, woken))}"
+        who = f"station{'s' * (len(woken) > 1)} {', '.join(map(str, woken))}"
+        return f"; {who} had been silent with the token, and went on as if nothing had been"
 
     def _clear_seen(self, address: int) -> str:
         return f"outputs are cleared for {self.watch.longest_clear(address) / NS_PER_S:.0f} s of data exchange"

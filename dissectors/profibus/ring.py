@@ -59,7 +59,7 @@ class SlaveRow:
 class Ring:
     """`first`, `last`: ns, of what was seen, but for `unheard` ns between. `wasted`: ns spent on polls that nobody
     answered. `has_times`: whether the capture says when anything came; else all times are those of octets laid one
-    behind the other."""
+    behind the other. `latency`: ns for which the adapter may hold octets back."""
 
     masters: Mapping[int, MasterView] = field(default_factory=dict)
     slaves: Mapping[int, SlaveRow] = field(default_factory=dict)
@@ -68,6 +68,16 @@ class Ring:
     wasted: int = 0
     has_times: bool = True
     unheard: int = 0
+    latency: int = 0
+
+    @property
+    def wasted_share(self) -> float | None:
+        """The share of the time, 0 … 1, that polls took which nobody answered; None where the capture cannot tell: the
+        adapter may hold octets back for longer than such a poll takes."""
+        unanswered = sum(view.polls - view.answered for view in self.masters.values())
+        if not self.has_times or self.latency * unanswered > self.wasted:
+            return None
+        return self.wasted / self.span if self.span else 0.0
 
     @property
     def span(self) -> int:

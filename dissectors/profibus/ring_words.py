@@ -8,6 +8,7 @@ from dissectors.findings import counted
 from dissectors.histogram import Histogram
 from dissectors.line import MS, NS_PER_S
 from dissectors.token_ring import Cell
+from dissectors.words import percent
 
 if TYPE_CHECKING:
     from dissectors.profibus.ring import Ring, SlaveRow
@@ -101,10 +102,12 @@ def sentences(ring: Ring) -> list[str]:
     """The ring as a whole, then each slave with its states and when it came into them."""
     order = ring.order
     said = [f"ring of {len(order)}: {' → '.join(map(str, (*order, order[0])))}" if order else "no closed ring seen"]
-    if ring.has_times:
-        said.append(f"GAP polls that nobody answers take {ring.wasted / ring.span if ring.span else 0:.1%} of the time")
-    else:
+    if not ring.has_times:
         said.append("when anything came is not known")
+    elif ring.wasted_share is None:
+        said.append("how much time GAP polls take that nobody answers, this adapter does not tell")
+    else:
+        said.append(f"GAP polls that nobody answers take {percent(ring.wasted_share)} of the time")
     return said + [_slave(ring, address, ring.slaves[address]) for address in sorted(ring.slaves)]
 
 

@@ -202,6 +202,7 @@ RULES: dict[str, Rule] = {
             "time it is only noted.",
             "the controller was stopped, restarted or too busy, or the token came round too late",
             "what the controller did then; the watchdog time of the project against the time of a round",
+            explains=("PB007", "PB017"),
         ),
         Rule(
             "PB020",

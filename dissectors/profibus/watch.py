@@ -213,7 +213,13 @@ class BusWatch:
             for address, view in self.slaves.items()
             if view.state is not None
         }
-        return Ring(masters, slaves, self._first or 0, self._last, self._wasted, self._timing.has_times, self._unheard)
+        timing = self._timing
+        return Ring(
+            *(masters, slaves, self._first or 0, self._last, self._wasted),
+            has_times=timing.has_times,
+            unheard=self._unheard,
+            latency=timing.latency,
+        )
 
     def window(self) -> RingWindow:
         """What is new since this was called the last time; the first time is not told of."""

@@ -21,11 +21,18 @@ _DAMAGE = (
     "MB007",
     "MB009",
     "MB104",
+    "MB207",
     "MB401",
     "N2004",
     "N2005",
     "N2010",
     "MS4",
+    "PB002",
+    "PB003",
+    "PB007",
+    "PB008",
+    "PB013",
+    "PB014",
 )
 """What damage to frames is told by, in every protocol."""
 
@@ -258,8 +265,8 @@ _ALL = (
         "silent for a while",
         "Not one octet for 3 s or more (10 s behind a request) and 30 times as long as all but 2 in 100 pauses, in the "
         "middle of traffic that goes on as before; not where such pauses are regular, and not where octets were lost "
-        "or the adapter was away. Of a bus that is listened to also while it lasts, from a minute on that is twice as "
-        "long as any silence before.",
+        "or the adapter was away. Of a bus that is listened to it is told also while it lasts: from a minute on, where "
+        "that is twice as long as any silence before.",
         "the master stopped: a restart, a busy controller, a changeover, a program that was loaded",
         "the master's log and watchdog at that time",
         explains=("MS101",),

@@ -48,7 +48,7 @@ def to_json(rule: Rule) -> dict[str, str | list[str]]:
         "explanation": rule.explanation,
         "means": rule.means,
         "next": rule.next,
-        "explains": list(rule.explains),
+        "explains": list(dict.fromkeys(rule.explains)),
         "told_by": list(rule.told_by),
     }
 
@@ -56,7 +56,8 @@ def to_json(rule: Rule) -> dict[str, str | list[str]]:
 def _explained(rule: Rule) -> str:
     lines = [f"{rule.code}  {rule.title}  ({rule.severity.label} unless said otherwise)", ""]
     lines += textwrap.wrap(rule.explanation, WIDTH)
-    explains = f"{', '.join(map(_codes, rule.explains))}, where it is a warning or an error" if rule.explains else ""
+    explained = dict.fromkeys(rule.explains)  # a code may come of several kinds of trouble that it explains
+    explains = f"{', '.join(map(_codes, explained))}, where it is a warning or an error" if explained else ""
     told_by = f"{', '.join(map(_codes, rule.told_by))}, where one of them speaks of the same" if rule.told_by else ""
     parts = (("consistent with", rule.means), ("check next", rule.next), ("explains", explains), ("told by", told_by))
     for word, text in parts:
