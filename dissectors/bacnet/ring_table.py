@@ -8,7 +8,7 @@ from dissectors.findings import counted
 from dissectors.histogram import Histogram
 from dissectors.line import MS
 from dissectors.token_ring import Cell
-from dissectors.words import milliseconds
+from dissectors.words import duration, milliseconds, percent
 
 if TYPE_CHECKING:
     from dissectors.bacnet.ring import Ring
@@ -96,8 +96,8 @@ def _happened(ring: Ring) -> list[str]:
 def _of_time(ring: Ring) -> list[str]:
     """How the time is used."""
     said = [
-        f"{counted(ring.frames, 'frame')} in {ring.span / 1e9:.1f} s; bus load {ring.load:.1%}",
-        f"unanswered polls for masters take {ring.poll_waste_share:.1%} of the time",
+        f"{counted(ring.frames, 'frame')} in {duration(ring.span)}; bus load {ring.load:.1%}",
+        f"unanswered polls for masters take {percent(ring.poll_waste_share)} of the time",
         *_users(ring),
     ]
     predicted = ring.predicted_loop

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from dissectors.findings import counted
 from dissectors.frame import Frame, Header, Role
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, ITEMS_ASKED, answer_length
 from dissectors.modbus.learned_timing import READ, WRITE
@@ -34,12 +35,19 @@ class Seen:
 @dataclass(frozen=True, slots=True)
 class Garble:
     """A damaged frame, or noise (`no` None), that came in place of an answer. `is_whole`: it has unit, function and
-    length of a copy of the request."""
+    length of a copy of the request. `octets`: how many of noise."""
 
     no: int | None
     end: int
     error: str
     is_whole: bool = False
+    octets: int = 0
+
+    @property
+    def before_the_answer(self) -> str:
+        """What it was, where the answer came after all."""
+        error = f"{counted(self.octets, 'octet')} that are no frame" if self.octets else self.error
+        return f"before the answer: {error}"
 
 
 @dataclass(slots=True)
@@ -161,7 +169,7 @@ class Exchange:
         if error is None and self.fault:
             error = damaged_request(self.fault)
         if error is None and self.garble:
-            error = f"before the answer: {self.garble.error}"
+            error = self.garble.before_the_answer
         attempt = self.attempt + sum(copy is not answer for copy in self.copies)
         if answer.octets[1] & EXCEPTION_BIT and (self.fault or self.is_for(answer.octets)):
             verdict = Verdict.EXCEPTION

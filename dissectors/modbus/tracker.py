@@ -318,7 +318,8 @@ class ModbusTracker(TrackerMemory):
         if request.garble or noise.reason in _QUIET_NOISE or len(noise.octets) < _GARBLE:
             return
         if self.learnt.in_time(request.unit, request.pace, request.gap(noise.start)):
-            request.garble = Garble(None, noise.end, f"{len(noise.octets)} octets came in answer, but no frame")
+            many = len(noise.octets)
+            request.garble = Garble(None, noise.end, f"{many} octets came in answer, but no frame", octets=many)
 
     # ---- judging
 

@@ -32,7 +32,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from dissectors.findings import Finding, Severity
-from dissectors.subject import About
 from dissectors.tracker import Verdict
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
@@ -80,8 +79,9 @@ class HealthReport:
     stations: Mapping[int, Health] = field(default_factory=dict)
 
 
-def health_of(summary: Summary, findings: Iterable[Finding] = ()) -> HealthReport:
-    """Health of the bus and of its stations; `findings`: all that are about this bus."""
+def health_of(summary: Summary, findings: Iterable[Finding] = (), noun: str = "station") -> HealthReport:
+    """Health of the bus and of its stations; `findings`: all that are about this bus; `noun`: what its people call a
+    station, whatever the device is that a finding speaks of."""
     grave = [finding for finding in findings if finding.severity >= Severity.WARNING]
     about: dict[int, list[Finding]] = {}
     for finding in grave:
@@ -98,8 +98,6 @@ def health_of(summary: Summary, findings: Iterable[Finding] = ()) -> HealthRepor
     bus = _bus_health(summary, there, beyond, [finding for finding in grave if finding.about.is_whole_bus])
     worst = min((address for address in about if address in stations), key=lambda a: stations[a].score, default=None)
     if worst is not None and (limit := (100 + stations[worst].score) // 2) < bus.score:
-        first = about[worst][0].about
-        noun = "MAC" if first.kind is About.PAIR else first.noun  # only a token ring has pairs
         reason = f"{noun} {worst} is at {stations[worst].score}, so the bus is at {limit} at best"
         bus = Health(limit, (*bus.reasons, reason))
     return HealthReport(bus, stations)

@@ -176,7 +176,7 @@ class BusModel:
 
     def health(self) -> HealthReport:
         """How the bus and its stations fare."""
-        return health_of(self.summary, self.findings())
+        return health_of(self.summary, self.findings(), self.dissector.noun)
 
     def ring(self) -> Any:
         """The token ring so far, a value of the protocol's own; None where no token is passed."""

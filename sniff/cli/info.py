@@ -185,8 +185,7 @@ def _print(
     if summary.searched or session.unknown:
         _line("search", _search(session, summary, events))
     _line("port", session.port or "unknown")
-    held = f"; holds octets back up to {milliseconds(adapter.latency)} ({adapter.latency_from})"
-    _line("adapter", adapter.name + (held if session.has_times else ""))
+    _line("adapter", adapter.name + (f"; {adapter.delay_words}" if session.has_times else ""))
     reports = "unknown" if adapter.reports is None else ", ".join(adapter.reports) or "none (zero errors mean nothing)"
     _line("reports", f"line errors: {reports}{'; ' + adapter.detail if adapter.detail else ''}")
     searched = f"{summary.searched} of them while searching, " if summary.searched else ""
@@ -229,7 +228,8 @@ def _print_nodes(summary: Summary) -> None:
         verdicts = {verdict.words: count for verdict, count in node.verdicts.items()}
         _line(
             f"node {node.address}",
-            f"{node.sent} frames from, {node.received} to; {_listed(verdicts) if verdicts else 'nothing asked of it'}",
+            f"{counted(node.sent, 'frame')} from, {node.received} to; "
+            f"{_listed(verdicts) if verdicts else 'nothing asked of it'}",
         )
         if node.errors:
             _line("", _listed(node.errors, " × ", "; "))  # their words have numbers and commas in them

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 
 from dissectors.line import MS
-from dissectors.words import milliseconds
 from sniff.analysis.sanitizing import sanitized
 from sniff.cli import json_output
 
@@ -40,10 +39,10 @@ def run(args: argparse.Namespace) -> int:
         reports = "unknown" if adapter.reports is None else ", ".join(adapter.reports) or "none"
         name = sanitized(adapter.name)  # an adapter may call itself anything
         print(f"{port.device}  {name}{f' ({adapter.driver})' if adapter.driver else ''}")
-        print(f"    holds octets back up to {milliseconds(adapter.latency)} ({adapter.latency_from})")
+        print(f"    {sanitized(adapter.delay_words)}")
         print(f"    line errors it reports: {reports}{'; ' + adapter.detail if adapter.detail else ''}")
         for holder in port.holders:
-            print(f"    held by {holder}")
+            print(f"    held by {sanitized(holder)}")  # and a process, too
     if not found and not args.json:
         print("no serial ports; try `sniff485 demo`, or a gateway: socket://HOST:PORT")
     return 0

@@ -36,7 +36,6 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent, Session
 
 if TYPE_CHECKING:
-    from sniff.analysis.health import HealthReport
     from sniff.bus.model import BusModel
     from sniff.engine.capture import Capture
     from sniff.engine.table import Table
@@ -101,7 +100,9 @@ def _of_captures(args: argparse.Namespace, table: str, opened: Sequence[tuple[st
     if table in ("ring", "stations"):
         shown = dissector_for(session).ring
         if shown is None:
-            raise Failure(f"{table}: {session.protocol} passes no token; {_for_whom(table)}", USAGE)
+            if table == "stations":
+                raise Failure(f"stations: {_for_whom(table)}; of {session.protocol} see nodes", USAGE)
+            raise Failure(f"ring: {session.protocol} passes no token; {_for_whom(table)}", USAGE)
         if table == "stations" and shown.stations is None:
             raise Failure(f"stations: {_for_whom(table)}; of {session.protocol} see nodes and ring", USAGE)
         from sniff.cli import ring
@@ -116,7 +117,7 @@ def _of_captures(args: argparse.Namespace, table: str, opened: Sequence[tuple[st
 
         model = BusModel(session, dissector_for(session), devices, with_points=False)
         survey(Watched(source), session, model, reference=args.reference)
-        tables.write(HEALTH_HEADINGS, _health(model.health(), station_word(session.protocol)), args.style)
+        tables.write(HEALTH_HEADINGS, _health(model, station_word(session.protocol)), args.style)
     elif table == "polls":
         from sniff.cli import polls
 
@@ -130,7 +131,8 @@ def _of_captures(args: argparse.Namespace, table: str, opened: Sequence[tuple[st
 def _write(args: argparse.Namespace, table: str, summary: Summary, kinds: _Kinds, session: Session) -> None:
     """Print a table of what was counted."""
     if table == "nodes":
-        nodes = [_node(node) for node in summary.nodes.present()]
+        bound = session.adapter.latency / MS
+        nodes = [(*_node(node), bound if node.latency.count else None) for node in summary.nodes.present()]
         if nodes or args.style != "text":
             tables.write(NODE_HEADINGS, nodes, args.style)
         else:
@@ -169,7 +171,7 @@ def _listen(args: argparse.Namespace, port: str, table: str) -> int:
         if table in ("ring", "stations"):
             _show_ring(model, table, args.style)
         elif table == "health":
-            tables.write(HEALTH_HEADINGS, _health(model.health(), station_word(live.session.protocol)), args.style)
+            tables.write(HEALTH_HEADINGS, _health(model, station_word(live.session.protocol)), args.style)
         elif table == "polls":
             from sniff.cli import polls
 
@@ -214,6 +216,7 @@ NODE_HEADINGS = (
     "p50 ms",
     "p95 ms",
     "max ms",
+    "± ms",
 )
 HEALTH_HEADINGS = ("subject", "health", "why")
 LATENCY_HEADINGS = ("address", "answers", "least ms", "p50 ms", "p95 ms", "max ms", "± ms")
@@ -247,7 +250,10 @@ def _verdict(verdict: Verdict, args: argparse.Namespace) -> str:
     return verdict.words if args.style == "text" else verdict.value
 
 
-def _health(health: HealthReport, word: str) -> list[tuple[Cell, ...]]:
+def _health(model: BusModel, word: str) -> list[tuple[Cell, ...]]:
+    health = model.health()
+    if not model.summary.octets:  # a bus that nobody heard is neither well nor ill
+        return [("bus", None, "nothing was heard")]
     rows = [("bus", health.bus), *((f"{word} {address}", one) for address, one in sorted(health.stations.items()))]
     return [(subject, one.score, "; ".join(one.reasons)) for subject, one in rows]
 

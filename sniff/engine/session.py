@@ -14,7 +14,7 @@ from typing import Final
 from dissectors import registry
 from dissectors.frame import Chunk
 from dissectors.line import MS, NS_PER_S, LineSettings, Timing
-from dissectors.words import brief
+from dissectors.words import brief, milliseconds
 from sniff.engine.read_times import ReadTimes, held_back
 
 DEVICES_NOTE = "devices"
@@ -39,6 +39,13 @@ class Adapter:
     detail: str = ""
     serial_number: str = ""
     packets: bool | None = None
+
+    @property
+    def delay_words(self) -> str:
+        """How exact its times are, in words, and where that is from."""
+        if not self.latency:
+            return f"times are taken as exact ({self.latency_from})"
+        return f"holds octets back up to {milliseconds(self.latency)} ({self.latency_from})"
 
     @property
     def lineless(self) -> bool:

@@ -14,6 +14,7 @@ from sniff.analysis.health import HealthReport, health_of
 from sniff.analysis.judgement import Judgement
 from sniff.analysis.judging import rules_over
 from sniff.analysis.summary import Summary
+from sniff.analysis.wording import station_word
 
 NO_DATE = "no date"
 """The day of captures whose times only count from their begin."""
@@ -76,7 +77,8 @@ class BusDay:
 
     def health(self, findings: Iterable[Finding] | None = None) -> HealthReport:
         """How the bus and its stations fared. `findings`: this day's, where they are known already."""
-        return health_of(self.summary, self.findings if findings is None else findings)
+        told = self.findings if findings is None else findings
+        return health_of(self.summary, told, station_word(self.protocol))
 
     @property
     def heard(self) -> Hashable:

@@ -57,12 +57,11 @@ def settings(store: Store, status: FeedStatus) -> list[Part]:
     timing, adapter = session.timing, session.adapter
     names = ", ".join(sanitized(part) for part in (adapter.name, adapter.driver, adapter.serial_number) if part)
     characters = f"one character {milliseconds(timing.char)}, 3.5 of them {milliseconds(timing.t35)}"
-    held = f"holds octets back up to {milliseconds(adapter.latency)} ({sanitized(adapter.latency_from)})"
     return [
         ("line", Text(f"{sanitized(session.line)} · {characters}")),
         (
             "adapter",
-            Text(f"{names} · {held if adapter.latency else 'times are exact'}" if session.has_times else names),
+            Text(f"{names} · {sanitized(adapter.delay_words)}" if session.has_times else names),
         ),
         ("reports", Text(reports(store))),
         ("started", Text(_started(session))),
