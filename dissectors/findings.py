@@ -43,8 +43,9 @@ class Rule:
 
     `title`: some words for a list. `explanation`: plain text for `rule CODE`: what is measured, against which limit,
     from which source. `means`, `next`: the defaults of its findings. `explains`: codes, or begins of codes, of what is
-    most likely a mere consequence of what this rule finds, at warning or above. `told_by`: the same of what tells the
-    same trouble better: where one of those stands, of the same subject, this rule's finding is a note under it; what
+    most likely a mere consequence of what this rule finds, at warning or above; `explains_there`: only where it stands
+    in the same frames and is no more. `told_by`: the same of what tells the same trouble better: where one of those
+    stands, of the same subject, this rule's finding is a note under it; what
     this rule finds of the bus stands under that of one station only where it is the only one that is struck. `lasts`:
     it is found as long as it is so, and no longer (`Finding.lasts`).
     """
@@ -56,6 +57,7 @@ class Rule:
     means: str = ""
     next: str = ""
     explains: tuple[str, ...] = ()
+    explains_there: tuple[str, ...] = ()
     told_by: tuple[str, ...] = ()
     lasts: bool = False
 
@@ -254,9 +256,12 @@ def with_consequences(findings: Iterable[Finding], rules: Mapping[str, Rule]) ->
         cause = made[at]
         if cause.cause is not None or cause.severity < Severity.WARNING or cause.code not in rules:
             continue
-        codes = rules[cause.code].explains
+        codes, there = rules[cause.code].explains, rules[cause.code].explains_there
         for other, finding in enumerate(made):
-            if other != at and finding.cause is None and codes and _is_explained(finding, cause, codes):
+            if other == at or finding.cause is not None:
+                continue
+            is_there = there and finding.count <= cause.count and not set(cause.evidence).isdisjoint(finding.evidence)
+            if (codes and _is_explained(finding, cause, codes)) or (is_there and _is_explained(finding, cause, there)):
                 made[other] = as_consequence(finding, cause, rules)
     return from_the_root(_told_once(made, rules), rules)
 

@@ -97,12 +97,14 @@ def _explained(rule: Rule) -> Iterator[str]:
             yield from ("", f"**{word}:** {told(text)}.")
     if rule.explains:
         yield from ("", f"**Explains,** where it is a warning or an error: {_links(rule.explains)}.")
+    if rule.explains_there:
+        yield from ("", f"**Explains,** where it stands in the same frames: {_links(rule.explains_there)}.")
     if rule.told_by:
         yield from ("", f"**Told by,** where one of them speaks of the same: {_links(rule.told_by)}.")
 
 
 def _links(codes: tuple[str, ...]) -> str:
-    return ", ".join(f"[{code}]({page_of(code)})" if len(code) == 5 else f"{code}…" for code in codes)
+    return ", ".join(f"[{code}]({page_of(code)})" if len(code) == 5 else f"{code}…" for code in dict.fromkeys(codes))
 
 
 def _shown(code: str) -> Iterator[str]:

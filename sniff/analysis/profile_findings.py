@@ -7,9 +7,9 @@ beyond what the adapter allows.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from dissectors.findings import Finding, Severity, Tally
+from dissectors.findings import Finding, Severity, Tally, times
 from dissectors.frame import Event, Frame, Header, Role
 from dissectors.line import NS_PER_S, Timing
 from dissectors.manifest import Dissector
@@ -23,7 +23,8 @@ from dissectors.subject import About, Subject, station
 from dissectors.tracker import Placement, Transaction
 from dissectors.words import milliseconds
 from sniff.analysis.point_reader import ALL, WHOLE, PointReader, Sample
-from sniff.analysis.profile_rules import PROFILE_RULES
+from sniff.analysis.profile_rules import PROFILE_RULES, WRITTEN_BEYOND, WRITTEN_NEXT
+from sniff.analysis.written_together import Written, together
 from sniff.engine.engine import Output, Row
 
 MOST_TOLD = 2_000
@@ -33,6 +34,8 @@ CODES = {EntryRole.FAULT: "PR004", EntryRole.ALARM: "PR005"}
 
 OF_STATUS = "status word"
 """Which of several things about a device: what its status word says, without saying why."""
+
+_READ_ONLY = "written, though it is read only"
 
 STATE_HOLDS = 10 * NS_PER_S
 """How long what a device said of its state is taken to be so."""
@@ -44,13 +47,16 @@ Key = tuple[str, Subject, str]
 @dataclass(slots=True)
 class _Told:
     """One finding in the making. `seen`: the first time; `is_same`: and each time after it. `worst`: ns, of the slowest
-    answer. `sure`: whether no layout behind it is a guess."""
+    answer. `sure`: whether no layout behind it is a guess. `thing`: what was written, where that is all that counts.
+    `is_written`: a master gave the value."""
 
     seen: str
+    thing: str = ""
     is_same: bool = True
     tally: Tally = field(default_factory=Tally)
     worst: int = 0
     sure: bool = True
+    is_written: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,22 +141,28 @@ class ProfileFindings:
         A bit of a status word that says no more than a code or trip bit of the same device is left out.
         """
         worded = {(code, subject) for code, subject, which in self._told if which != OF_STATUS}
+        written = [Written(key, told.thing, told.tally) for key, told in self._told.items() if told.thing]
+        at_once = {one.key: seen for one, seen in together(written)}
         return tuple(
-            self._found(key, told)
+            self._found(key, told, at_once.get(key, ""))
             for key, told in self._told.items()
-            if key[2] != OF_STATUS or (key[0], key[1]) not in worded
+            if (key[2] != OF_STATUS or (key[0], key[1]) not in worded) and (not told.thing or key in at_once)
         )
 
-    def _found(self, key: Key, told: _Told) -> Finding:
+    def _found(self, key: Key, told: _Told, at_once: str) -> Finding:
+        """`at_once`: what is seen of it and of all that was written with it."""
         code, subject, _ = key
-        count, seen = told.tally.count, told.seen
+        count, seen = told.tally.count, at_once or told.seen
         if code == "PR007":
             seen = f"{count} of {self._answers.get(subject, 0)} answers {seen}, the slowest at least "
             seen += milliseconds(told.worst)
         elif count > 1:
-            seen = f"{seen}, {count} times" if told.is_same else f"{seen}; that is the first of {count} times"
+            seen = (
+                f"{seen}, {times(count)}" if told.is_same or at_once else f"{seen}; that is the first of {count} times"
+            )
         if told.sure:
-            return told.tally.found(PROFILE_RULES[code], subject, seen)
+            finding = told.tally.found(PROFILE_RULES[code], subject, seen)
+            return replace(finding, means=WRITTEN_BEYOND, next=WRITTEN_NEXT) if told.is_written else finding
         seen += ", as far as this is where the state stands in the answer, which no public source confirms"
         return told.tally.found(PROFILE_RULES[code], subject, seen, Severity.NOTE)
 
@@ -197,16 +209,17 @@ class ProfileFindings:
             if profile.is_reserved(reading.space, reading.address):
                 place = profile.number_of(reading.space, reading.address)
                 if profile.forbids(reading.space, reading.address, reading.raw):
-                    self._add("PR002", who, place, f"{reading.value} written to reserved {place}", frame.end, no)
+                    seen = f"{reading.value} written to reserved {place}"
+                    self._add("PR002", who, place, seen, frame.end, no, thing=place)
             elif not reading.part and f"{kind}:{reading.space}" in profile.limits_on(self._family).read_only:
                 place = f"{reading.space} {reading.address}"
                 self._add("PR003", who, place, f"{place} written by {kind}, which does not change it", frame.end, no)
             elif f"{reading.space}:{reading.part}" in profile.limits_on(self._family).read_only:
                 place = f"{reading.space} {reading.address} {reading.part}"
-                self._add("PR003", who, place, f"{place} written, it is read only", frame.end, no)
+                self._add("PR003", who, place, f"{place} {_READ_ONLY}", frame.end, no, thing=place)
             elif entry is not None and not entry.access.writable:
-                seen = f"{entry.title} ({entry.number}) written, it is read only"
-                self._add("PR003", who, entry.name, seen, frame.end, no)
+                thing = f"{entry.title} ({entry.number})"
+                self._add("PR003", who, entry.name, f"{thing} {_READ_ONLY}", frame.end, no, thing=thing)
             elif entry is not None and (bits := _reserved_bits(entry, reading)):
                 words = " ".join(f"{bit:X}" for bit in bits)
                 seen = f"{entry.title} ({entry.number}) written with reserved bits {words} set"
@@ -290,7 +303,9 @@ class ProfileFindings:
             return
         what = "written" if value.how is Origin.WRITE else "answered"
         seen = f"{entry.title} {number(value.value, entry, value.unit)} {what}, range {range_words(entry)}"
-        self._add("PR001", who, f"{entry.name} {what}", seen, time, no)
+        told = self._add("PR001", who, f"{entry.name} {what}", seen, time, no)
+        if told is not None:
+            told.is_written = value.how is Origin.WRITE
 
     def _judge_time(self, transaction: Transaction) -> None:
         profile = self._devices.at(transaction.station)
@@ -306,13 +321,15 @@ class ProfileFindings:
             if told is not None:
                 told.worst = max(told.worst, latency.low)
 
-    def _add(self, code: str, subject: Subject, which: str, seen: str, time: int, no: int) -> _Told | None:
+    def _add(
+        self, code: str, subject: Subject, which: str, seen: str, time: int, no: int, thing: str = ""
+    ) -> _Told | None:
         key = code, subject, which
         told = self._told.get(key)
         if told is None:
             if len(self._told) >= MOST_TOLD:
                 return None
-            told = self._told[key] = _Told(seen, sure=code not in CODES.values())
+            told = self._told[key] = _Told(seen, thing, sure=code not in CODES.values())
         told.is_same = told.is_same and told.seen == seen
         told.tally.add(time, no)
         return told

@@ -4,6 +4,13 @@ from __future__ import annotations
 
 from dissectors.findings import Rule, Severity
 
+WRITTEN_BEYOND = "the wrong profile, or a scale, unit or limit in the master that is not the device's"
+WRITTEN_NEXT = "compare the device with its profile (`profile guess`), then this value in the master"
+"""What PR001 means of a value that was written: the device has no part in it."""
+
+_REFUSED = ("MB008", "N2009", "MS305")
+"""What a station says to a request that it cannot carry out."""
+
 PROFILE_RULES: dict[str, Rule] = {
     rule.code: rule
     for rule in (
@@ -15,6 +22,7 @@ PROFILE_RULES: dict[str, Rule] = {
             "(from the manual of the device).",
             "the wrong profile, a setting beyond the device, or a failed sensor",
             "compare the device with its profile (`profile guess`), then look at the setting",
+            explains_there=_REFUSED,
         ),
         Rule(
             "PR002",
@@ -23,6 +31,7 @@ PROFILE_RULES: dict[str, Rule] = {
             "A master writes to a register that the maker keeps for itself. The TECO manuals say not to (1.0.2).",
             "the master's register list does not fit this device, or counts from 1 where it should count from 0",
             "compare the master's register numbers with the device's table",
+            explains_there=_REFUSED,
         ),
         Rule(
             "PR003",
@@ -31,6 +40,7 @@ PROFILE_RULES: dict[str, Rule] = {
             "A master writes to a register or object that can only be read.",
             "the master's list does not fit this device, or the wrong station is asked",
             "compare the master's list with the device's table",
+            explains_there=_REFUSED,
         ),
         Rule(
             "PR004",
@@ -58,6 +68,7 @@ PROFILE_RULES: dict[str, Rule] = {
             "registers: 80, manual 1.0.1).",
             "a master that reads or writes too much at once",
             "have the master read fewer registers in one request",
+            explains_there=_REFUSED,
         ),
         Rule(
             "PR007",
@@ -76,6 +87,7 @@ PROFILE_RULES: dict[str, Rule] = {
             "there (1.0.2).",
             "the master's bits do not fit this device",
             "compare the master's command word with the device's table",
+            explains_there=_REFUSED,
         ),
         Rule(
             "PR009",

@@ -49,6 +49,7 @@ def to_json(rule: Rule) -> dict[str, str | list[str]]:
         "means": rule.means,
         "next": rule.next,
         "explains": list(dict.fromkeys(rule.explains)),
+        "explains_there": list(rule.explains_there),
         "told_by": list(rule.told_by),
     }
 
@@ -58,6 +59,9 @@ def _explained(rule: Rule) -> str:
     lines += textwrap.wrap(rule.explanation, WIDTH)
     explained = dict.fromkeys(rule.explains)  # a code may come of several kinds of trouble that it explains
     explains = f"{', '.join(map(_codes, explained))}, where it is a warning or an error" if explained else ""
+    if rule.explains_there:
+        explains += "; " if explains else ""
+        explains += f"{', '.join(map(_codes, rule.explains_there))} in the same frames"
     told_by = f"{', '.join(map(_codes, rule.told_by))}, where one of them speaks of the same" if rule.told_by else ""
     parts = (("consistent with", rule.means), ("check next", rule.next), ("explains", explains), ("told by", told_by))
     for word, text in parts:

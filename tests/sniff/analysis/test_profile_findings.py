@@ -76,7 +76,10 @@ def brief(findings: Iterable[Finding]) -> list[tuple[str, str, str]]:
             [("PR001", "drive 1", "frequency command 655.35 Hz answered, range 0 … 599 Hz")],
         ),
         (("010625080001", "018604"), [("PR002", "drive 1", "1 written to reserved 2508h")]),
-        (("010625240001", "018604"), [("PR003", "drive 1", "output frequency (2524h) written, it is read only")]),
+        (
+            ("010625240001", "018604"),
+            [("PR003", "drive 1", "output frequency (2524h) written, though it is read only")],
+        ),
         (("010325210001", "0103020011"), [("PR004", "drive 1", "fault: code 17, external fault 01")]),
         (("010325210001", "01030200ff"), [("PR004", "drive 1", "fault: code 255, not in the manual")]),
         (("010325280001", "0103020009"), [("PR005", "drive 1", "alarm: code 9, UT")]),
@@ -186,7 +189,7 @@ def test_a_simulated_bus_without_faults(name: str) -> None:
 @pytest.mark.parametrize(
     ("devices", "exchange", "words", "severity"),
     [
-        (E510, ("010625240001", "018605"), "exception 5 (write mode error)", Severity.WARNING),
+        (E510, ("010625010001", "018605"), "exception 5 (write mode error)", Severity.WARNING),
         (E510, ("010625020001", "018604"), "exception 4 (data setting error)", Severity.WARNING),
         (Devices({2: packaged("teco-e510")}), ("010625240001", "018605"), "exception 5 (acknowledge)", Severity.NOTE),
         (None, ("010625240001", "018605"), "exception 5 (acknowledge)", Severity.NOTE),
@@ -310,7 +313,7 @@ access = "r"
 type = "u32"
 """
     found = judged(("0110001000020400000005", "011000100002"), devices=Devices(default=parse_text(document, "meter")))
-    assert brief(found) == [("PR003", "device 1", "energy (0010h) written, it is read only")]
+    assert brief(found) == [("PR003", "device 1", "energy (0010h) written, though it is read only")]
 
 
 def test_who_writes_the_display_selection_of_a_drive_is_not_accused() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dissectors.findings import Finding, with_consequences
+from dissectors.findings import Finding, Severity, with_consequences
 from dissectors.findings import found as found_by
 from sniff.analysis.judging import all_rules
 from sniff.cli.rule import to_json
@@ -119,3 +119,30 @@ def test_a_rule_names_each_code_once() -> None:
     for rule in all_rules().values():
         explained = to_json(rule)["explains"]
         assert len(explained) == len(set(explained)), rule.code
+
+
+@pytest.mark.parametrize(
+    ("capture", "code"),
+    [("drive-read-only-register", "PR003"), ("drive-reserved-register", "PR002"), ("drive-told-too-much", "PR001")],
+)
+def test_what_a_device_refuses_as_its_manual_says_is_told_once(capture: str, code: str) -> None:
+    assert found(capture, "MB008").cause == (code, "drive 2")
+
+
+def test_a_refusal_of_something_else_stands_for_itself() -> None:
+    rules = all_rules()
+    written = found_by(rules["PR003"], "drive 2", "", count=2, evidence=(1, 15))
+    for evidence, count, is_told in (((1, 2), 1, True), ((7, 8), 1, False), ((1, 2, 7, 8, 9, 10), 3, False)):
+        refused = found_by(rules["MB008"], "station 2", "", count=count, evidence=evidence)
+        assert (with_consequences((written, refused), rules)[1].cause is not None) is is_told
+
+
+def test_what_one_request_writes_is_one_finding() -> None:
+    made = read_capture(FINDINGS / "drive-frame-too-long.cap.txt").findings
+    graves = [one.code for one in made if one.severity >= Severity.WARNING]
+    assert graves == ["PR002", "PR003", "PR006"]
+    assert "2506h, 2508h, 2509h, 250Ah and 6 more" in found("drive-frame-too-long", "PR002").seen
+
+
+def test_a_value_that_was_written_is_no_failed_sensor() -> None:
+    assert "sensor" not in found("drive-told-too-much", "PR001").means
