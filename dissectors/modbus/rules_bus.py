@@ -14,6 +14,7 @@ from dissectors.modbus.finding_words import note_if, of_few, request_words, unit
 from dissectors.modbus.odd_ends import OddEnd
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.rules_late import of_impatience, of_late_speakers, under_late_answers
+from dissectors.modbus.rules_of_answers import RELAYED
 from dissectors.modbus.rules_station import FLAWS, is_absent, of_missing, of_station, wrongly_checked
 from dissectors.modbus.rules_unheard import of_unheard
 from dissectors.words import duration, fine_milliseconds, percent
@@ -186,7 +187,8 @@ def _of_requests(seen: BusRecord) -> Iterator[Finding]:
         words = (
             f"{counted(count, 'request')} came a second time {fine_milliseconds(again)} after the first, never a third"
         )
-        yield seen.again.tally.found(RULES["MB018"], "bus", f"{words}, and were answered then")
+        relayed = seen.again.tally.found(RULES["MB018"], "bus", f"{words}, and were answered then")
+        yield replace(relayed, means=RELAYED, next="which radio or repeater is on the way to this tap")
     flaws, damaged = seen.requests_damaged_by, seen.damaged_requests.count
     # where not one is good and all that can be put right have one flaw, the others are two in one read
     of = 4 if damaged == seen.requests and len(flaws) == 1 else 2
@@ -222,7 +224,7 @@ def _of_masters(seen: BusRecord) -> Iterator[Finding]:
     for _, _, time, before, no, _ in sorted((*hasty, *broken_in), key=lambda row: row[2]):
         tally.add(time, before, no)
     many = f"over {len(gaps)}" if seen.too_many else len(gaps)
-    words = f"{many} requests came while another one waited for a station that answers, and never so soon"
+    words = f"{many} requests came while another one waited for a station that answers, but never so soon"
     if gaps[len(gaps) // 2] < 10 * MS:
         words += f"; half of them within {fine_milliseconds(gaps[len(gaps) // 2])}"
     yield tally.found(RULES["MB203"], "bus", words)
@@ -362,7 +364,8 @@ def _cycle(seen: BusRecord) -> Iterator[Finding]:
         return
     unit, key, periods = usual
     low, median, high = (periods[len(periods) * part // 100] for part in (5, 50, 95))
-    words = f"the master comes back to station {unit} ({request_words(key)}) every {duration(median)}"
+    whom = f"station {unit}" if unit else "address 0"  # which is no station's
+    words = f"the master comes back to {whom} ({request_words(key)}) every {duration(median)}"
     if high - low > max(median // 50, 2 * seen.timing.latency, MS):
         words += f"; 9 of 10 times after {duration(low)} to {duration(high)}"
     yield found(RULES["MB401"], "bus", words, first=seen.first or 0, last=seen.now, count=len(periods))

@@ -7,6 +7,9 @@ from dissectors.findings import Rule, Severity
 _OF_DAMAGE = ("MB002", "MB005", "MB007", "MB104", "MB202")
 """What damage that is always the same would otherwise be taken for."""
 
+RELAYED = "a relay, or a slow echo, that this tap hears beside the master"
+"""What MB018 means of the bus."""
+
 ANSWER_RULES = (
     Rule(
         "MB001",
@@ -202,10 +205,9 @@ ANSWER_RULES = (
         "request copied back",
         "Nine in ten requests to one station come back at once, and those to others never. Of the bus: nine in ten "
         "requests, to two stations or more, come a second time, always as long after the first, within 150 ms, never "
-        "a third, and are answered then.",
-        "this station's driver hears itself, or its converter repeats what it hears, before the station answers; where "
-        "all requests come twice, a relay or a slow echo that this tap hears beside the master",
-        "how its driver and receiver are enabled; the converter in front of it; which radio or repeater is on the way",
+        "a third, and are answered then: a relay, or a slow echo, that this tap hears beside the master.",
+        "this station's driver hears itself, or its converter repeats what it hears, before the station answers",
+        "how its driver and receiver are enabled; the converter in front of it",
         explains=("MB002", "MB003", "MB004", "MB005", "MB020", "MB104", "MB301", "LN205"),
     ),
     Rule(

@@ -12,7 +12,7 @@ from dissectors.late_speakers import reaching
 from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.exception_meanings import EXCEPTIONS, MAKER_EXCEPTION, USED_ALIKE, VENDOR_EXCEPTION
-from dissectors.modbus.finding_words import note_if, of_few, request_words, share_words
+from dissectors.modbus.finding_words import note_if, of_few, request_words, share_words, was_away
 from dissectors.modbus.functions import EXCEPTIONS as EXCEPTION_NAMES
 from dissectors.modbus.header import code_number
 from dissectors.modbus.response_groups import AnsweredRequest
@@ -117,7 +117,7 @@ def of_missing(seen: BusRecord, unit: int, station: StationRecord, is_scanned: b
     if left > 0:
         words = f"no answer to {left} of {counted(station.asked, 'request')}"
         finding = missing.found(RULES["MB002"], name, words, note_if(seen.rare(left, station.asked)))
-        yield replace(finding, count=left)
+        yield replace(was_away(finding, station.away) if station.answered else finding, count=left)
 
 
 _RARELY = 20

@@ -153,13 +153,15 @@ class Lost:
 
 @dataclass(slots=True)
 class StationRecord:
-    """One station. `missing`: no octet followed. `silent`: those since its last sign of life. `unheard`: of those that
-    are missing such after which the master went on as after an answer."""
+    """One station. `missing`: no octet followed. `silent`: those since its last sign of life; `away`: the most of them
+    in a row after which it was heard again. `unheard`: of those that are missing such after which the master went on
+    as after an answer."""
 
     asked: int = 0
     answered: int = 0
     missing: Tally = field(default_factory=Tally)
     silent: Tally = field(default_factory=Tally)
+    away: Tally = field(default_factory=Tally)
     unheard: Tally = field(default_factory=Tally)
     damaged: Tally = field(default_factory=Tally)
     cut: int = 0  # of the damaged answers: ended early
@@ -286,6 +288,7 @@ class StationRecord:
         """Something came from it."""
         self.last_heard = time
         if self.silent.count:
+            self.away = max(self.away, self.silent, key=lambda one: one.count)
             self.silent = Tally()
 
 

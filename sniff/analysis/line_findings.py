@@ -343,13 +343,16 @@ class LineFindings:
         if self._overruns.count:
             words = f"overrun reported {times(self._overruns.count)}"
             mostly = 4 * self._damaged_here >= 3 * self._damaged
-            words += f", in {self._damaged_here} of {self._damaged} that are no good frames" if self._damaged else ""
+            if self._damaged_here:
+                whole = f"{self._damaged_here} of {self._damaged} rows that are no good frame"
+                words += f", in {whole if self._damaged > 1 else 'the only row that is no good frame'}"
             yield self._overruns.found(RULES["LN104"], "adapter", words, None if mostly else Severity.NOTE)
 
     def _rubbish(self) -> Finding:
         share = self._in_frames / self._octets
         how_many = "not one" if not self._in_frames else "hardly one" if share < 0.005 else f"only {share:.0%}"
-        words = f"{how_many} of {self._octets} octets is part of a good frame"
+        verb = "are" if self._in_frames and share >= 0.005 else "is"
+        words = f"{how_many} of {self._octets} octets {verb} part of a good frame"
         fit = self._other_settings() or self._lacking_bits()
         if fit is not None:
             finding = self._whole("LN003", "bus", f"{words}; {fit.seen}")

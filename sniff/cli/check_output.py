@@ -135,7 +135,8 @@ def _write_head(one: Checked, width: int) -> None:
                 _paragraph(f"{word} {address}: {health}", width, "    ", "      ")
         whole = [address for address, health in sorted(one.stations.items()) if health.score == 100]
         if whole:
-            _paragraph(f"at 100: {word} {', '.join(map(str, whole))}", width, "    ")
+            several = "s" if len(whole) > 1 and word.islower() else ""  # but "MAC 1, 2"
+            _paragraph(f"at 100: {word}{several} {', '.join(map(str, whole))}", width, "    ")
 
 
 def _write_together(checked: Sequence[Checked], width: int) -> None:

@@ -146,3 +146,14 @@ def test_what_one_request_writes_is_one_finding() -> None:
 
 def test_a_value_that_was_written_is_no_failed_sensor() -> None:
     assert "sensor" not in found("drive-told-too-much", "PR001").means
+
+
+def test_a_station_that_was_away_for_a_while_lost_no_single_frames() -> None:
+    one = found("rtu-station-away-for-a-while", "MB002")
+    assert "all in a row within 5.47 s; then it answered again" in one.seen
+    assert "loose wire" not in one.means
+    assert "loose wire" in found("rtu-slow-station", "MB002").means
+
+
+def test_what_is_for_everybody_is_not_called_a_station() -> None:
+    assert "comes back to address 0 (" in found("line-many-broadcasts", "MB401").seen
