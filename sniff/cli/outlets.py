@@ -39,7 +39,7 @@ def add_outlets(parser: argparse.ArgumentParser) -> None:
     """Options of every command that listens. What they do not say, the configuration does."""
     group = parser.add_argument_group(
         "outlets",
-        "Who is told values and findings meanwhile; also [mqtt], [influx], [json], [foxglove], [metrics] in "
+        "Who is told values and findings meanwhile; also [mqtt], [influx], [json], [foxglove], [metrics] in\n"
         "sniff485.toml. One that falls behind is dropped from, with a count; the capture waits for none.",
     )
     group.add_argument(

@@ -1,9 +1,9 @@
 """Values by name: the latest of each point as a table; --csv, --json and --parquet give every sample. Names and units
 come from device profiles (-d), else a point is its place: holding/40108, AI/9, and the table says what its values look
 like: "guessed" stands before that, and two registers that are one number are one row then. Quality: 0 good, 1 doubtful,
-2 out of range. every ms: from one sample to the next, half of them are shorter; ±: by how much nine of ten differ,
-halved. Parquet needs `pip install 'sniff485[parquet]'`. Of a PORT or a configured bus: the table as it becomes, until
-Ctrl-C or --duration, then as it is; nothing is recorded.
+2 out of range. every ms: from one sample to the next, half of them are shorter; jitter ms: by how much nine of ten
+differ, halved. Parquet needs `pip install 'sniff485[parquet]'`. Of a PORT or a configured bus: the table as it becomes,
+until Ctrl-C or --duration, then as it is; nothing is recorded.
 """
 
 from __future__ import annotations

@@ -46,8 +46,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="FILTER|CODE",
         help="a trigger: frames that match, or findings (MB001, MS104); marked in the recording; repeatable",
     )
-    parser.add_argument("--before", type=arguments.duration, metavar="TIME", help="keep only what surrounds a trigger:")
-    parser.add_argument("--after", type=arguments.duration, metavar="TIME", help="so much before and after it")
+    parser.add_argument("--before", type=arguments.duration, metavar="TIME", help="keep triggers, and so much before")
+    parser.add_argument("--after", type=arguments.duration, metavar="TIME", help="and so much after; nothing else")
     parser.add_argument(
         "--json",
         action="store_const",
