@@ -236,6 +236,7 @@ class Checking:
             health=health.bus,
             stations=health.stations,
             starts=self._starts,
+            summary=summary,
         )
 
 

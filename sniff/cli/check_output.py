@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Rule, Severity, merged, times, under_causes
 from dissectors.line import NS_PER_S
-from sniff.analysis.health import Health
+from sniff.analysis.health import Health, health_of
 from sniff.analysis.json_text import dumps
 from sniff.analysis.judging import rules_over
 from sniff.analysis.sanitizing import sanitized
@@ -24,6 +24,7 @@ from sniff.engine.session import Session
 
 if TYPE_CHECKING:
     from sniff.analysis.site_findings import SiteBus
+    from sniff.analysis.summary import Summary
 
 EVIDENCE_SHOWN = 5
 _INDENT = " " * 9
@@ -36,6 +37,7 @@ class Checked:
 
     `note`: why it is not whole. `stations`: health by address. `starts`: begin of each frame by its number − 1, ns.
     `site_bus`: what others on the same clock are held against. `buses`: of what several say together, their names.
+    `summary`: what its health is reckoned from.
     """
 
     source: str
@@ -49,6 +51,14 @@ class Checked:
     starts: array[int]
     site_bus: SiteBus | None = None
     buses: tuple[str, ...] = ()
+    summary: Summary | None = None
+
+    def explained(self, findings: tuple[Finding, ...]) -> Checked:
+        """The same with its findings after others explained some: what is a consequence costs no health."""
+        if findings == self.findings or self.summary is None:
+            return self.with_findings(findings)
+        health = health_of(self.summary, findings, station_word(self.session.protocol))
+        return replace(self, findings=findings, health=health.bus, stations=health.stations)
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Checked:
         """The same with a choice of its findings."""
@@ -67,7 +77,7 @@ def as_site(name: str, buses: Sequence[Checked]) -> list[Checked]:
     from sniff.analysis.site_findings import judged  # of several buses
 
     site = judged([replace(bus, findings=one.findings) for bus, one in zip(held, buses, strict=True)])
-    told = [one.with_findings(own) for one, own in zip(buses, site.buses, strict=True)]
+    told = [one.explained(own) for one, own in zip(buses, site.buses, strict=True)]
     if not site.findings:
         return told
     seconds, frames = max(one.seconds for one in buses), sum(one.frames for one in buses)
