@@ -61,7 +61,8 @@ class Meaning:
 
     `station`: whose values they are, None for all stations; `request`: what it answers, None where it is no answer or
     nobody heard the question. `refused`: the maker's words for the exception code that it carries. `asked`: the places
-    that a request speaks of without a value (`dissectors.readings.Asks`). `written`: what an answer confirms.
+    that a request speaks of without a value (`dissectors.readings.Asks`). `written`: what an answer confirms. `noun`:
+    what the people of its protocol call a station.
     """
 
     station: int | None
@@ -71,11 +72,12 @@ class Meaning:
     request: Frame | None = None
     asked: tuple[Reading, ...] = ()
     written: tuple[Reading, ...] = ()
+    noun: str = "station"
 
     @property
     def who(self) -> str:
-        """The device: "drive 3", "all drives"; "station 3" without a profile."""
-        noun = "station" if self.profile is None else self.profile.noun
+        """The device: "drive 3", "all drives"; "station 3" or "MAC 3" without a profile."""
+        noun = self.noun if self.profile is None else self.profile.noun
         return f"all {noun}s" if self.station is None else f"{noun} {self.station}"
 
     @property

@@ -204,4 +204,4 @@ def meaning_of(dissector: Dissector, devices: Devices, row: Row, request: Frame 
     refusal = dissector.refusal
     refused = refusal(event) if profile is not None and refusal is not None and not readings else None
     words = profile.exception(*refused) if profile is not None and refused is not None else ""
-    return Meaning(station, profile, readings, words, request, asked, written)
+    return Meaning(station, profile, readings, words, request, asked, written, dissector.noun)

@@ -53,8 +53,9 @@ def run(args: argparse.Namespace) -> int:
             summary, points = taken, tuple(counted.points)
         findings = filtering.shown_findings(args, capture, session, model.findings(), model.devices)
         line = "" if session.line_is_assumed else str(session.line)
-        title = dissector_for(session).title
-        sides.append(Side(path, summary, findings, session.adapter.latency, points, title, line, session.has_times))
+        spoken = dissector_for(session)
+        has_times, latency = session.has_times, session.adapter.latency
+        sides.append(Side(path, summary, findings, latency, points, spoken.title, line, has_times, spoken.noun))
     found = list(differences(*sides))
     rows = [(one.subject, one.what, one.before, one.after) for one in found]
     if rows or args.style != "text":

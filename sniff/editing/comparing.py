@@ -36,6 +36,7 @@ class Side:
     protocol: str = ""
     line: str = ""
     has_times: bool = True
+    noun: str = "station"  # what the people of its protocol call one
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +56,7 @@ def differences(before: Side, after: Side) -> Iterator[Difference]:
     new = {node.address: node for node in after.counts.nodes.present()}
     doubt = before.latency + after.latency
     for address in sorted(old.keys() | new.keys()):
-        subject = f"station {address}"
+        subject = f"{after.noun} {address}"
         if address not in old or address not in new:
             yield Difference(subject, "presence", _presence(old.get(address)), _presence(new.get(address)))
         else:
@@ -113,7 +114,7 @@ def _values(before: Side, after: Side) -> Iterator[Difference]:
         if other is None or point.sample.value.bit or _overlap(point, other):
             continue
         station = point.sample.station
-        subject = station if station == ALL else f"station {station}"
+        subject = station if station == ALL else f"{after.noun} {station}"
         yield Difference(subject, point.sample.name, _range(point), _range(other))
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from dissectors.meaning import Meaning
 from sniff.cli import main
 
 CAPTURES = Path(__file__).parents[3] / "captures"
@@ -46,3 +47,15 @@ def test_a_station_has_one_name_in_the_table_of_health(capsys: pytest.CaptureFix
 def test_a_bus_that_was_not_heard_is_neither_well_nor_ill(capsys: pytest.CaptureFixture[str]) -> None:
     (row,) = said(capsys, "stats", f"{CAPTURES}/findings/silent-bus.cap.txt", "health", "--json").splitlines()
     assert json.loads(row) == {"subject": "bus", "health": None, "why": "nothing was heard"}
+
+
+def test_a_station_is_called_what_its_people_call_it(capsys: pytest.CaptureFixture[str]) -> None:
+    before, after = f"{CAPTURES}/mstp-clean.cap.txt", f"{CAPTURES}/findings/ms-tp-address-twice.cap.txt"
+    subjects = {line.split("  ")[0] for line in said(capsys, "diff", before, after).splitlines()[1:]}
+    assert subjects == {"bus", "MAC 2", "MAC 9"}
+    assert Meaning(5, None, noun="MAC").who == "MAC 5"
+
+
+def test_what_a_site_explains_costs_the_bus_no_health() -> None:
+    told = (CAPTURES / "sites/power-lost.check.txt").read_text("utf-8")
+    assert told.count("health 100") == 3
