@@ -142,8 +142,8 @@ def use(ring: Ring) -> Iterable[Remark]:
         share = node.held / ring.span
         if len(masters) > 1 and share >= HOG_SHARE and node.most_in_a_hold >= HOG_FRAMES:
             seen = (
-                f"has the token for {share:.0%} of the time and sends up to {node.most_in_a_hold} frames with one "
-                "(its Max_Info_Frames is at least that)"
+                f"has the token for {percent(share, 0)} of the time and sends up to {node.most_in_a_hold} frames with "
+                "one (its Max_Info_Frames is at least that)"
             )
             yield plain("MS601", ring, mac, seen)
     yield from _storm(ring)
@@ -206,7 +206,7 @@ def _near_limit(ring: Ring) -> Iterable[Remark]:
     for_data = 1 - rounds * idle / ring.span - ring.poll_waste_share
     if for_data >= NEAR_LIMIT and loop >= STRETCHED * idle:
         seen = (
-            f"data take {for_data:.0%} of the time; a round takes {measured(loop)} where an idle one would take "
-            f"{at_most}{measured(idle)}"
+            f"data take {percent(for_data, 0)} of the time; a round takes {measured(loop)} where an idle one would "
+            f"take {at_most}{measured(idle)}"
         )
         yield plain("MS603", ring, None, seen, severity=Severity.NOTE)

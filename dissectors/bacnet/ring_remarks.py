@@ -9,7 +9,7 @@ from dissectors.bacnet.ring import Ring
 from dissectors.bacnet.ring_events import Happened
 from dissectors.bacnet.rules import RULES
 from dissectors.findings import EVIDENCE_MAX, Finding, Severity, found
-from dissectors.words import duration
+from dissectors.words import duration, percent
 
 
 class Remark(NamedTuple):
@@ -71,7 +71,7 @@ def share_of_polls(ring: Ring) -> str:
     """How much of the time polls take that nobody answers; "" where nothing tells times."""
     if not ring.timing.has_times:
         return ""
-    return f"; unanswered polls of all stations take {ring.poll_waste_share:.0%} of the time"
+    return f"; unanswered polls of all stations take {percent(ring.poll_waste_share, 0)} of the time"
 
 
 def measured(time: int | None) -> str:

@@ -96,7 +96,7 @@ def _happened(ring: Ring) -> list[str]:
 def _of_time(ring: Ring) -> list[str]:
     """How the time is used."""
     said = [
-        f"{counted(ring.frames, 'frame')} in {duration(ring.span)}; bus load {ring.load:.1%}",
+        f"{counted(ring.frames, 'frame')} in {duration(ring.span)}; bus load {percent(ring.load)}",
         f"unanswered polls for masters take {percent(ring.poll_waste_share)} of the time",
         *_users(ring),
     ]
@@ -113,7 +113,8 @@ def _users(ring: Ring) -> list[str]:
     said = []
     if held and ring.span:
         shares = ", ".join(
-            f"MAC {mac} {time / ring.span:.0%} (up to {counted(ring.nodes[mac].most_in_a_hold, 'frame')} a token)"
+            f"MAC {mac} {percent(time / ring.span, 0)} "
+            f"(up to {counted(ring.nodes[mac].most_in_a_hold, 'frame')} a token)"
             for time, mac in held[:3]
         )
         said.append(f"the token is longest with {shares}")

@@ -28,7 +28,7 @@ EXCEPTIONS: dict[int, tuple[Severity, str, str]] = {
         "the device cannot do what was asked; older Modicon devices say so of programming",
         "the request against the device's manual",
     ),
-    8: (Severity.ERROR, "the device found its memory damaged", "replace the device's memory or the device"),
+    8: (Severity.ERROR, "the device found its memory damaged", "whether it comes again; then its maker"),
     10: (Severity.WARNING, "a gateway has no path to the target", "the gateway's routes and port settings"),
     11: (Severity.WARNING, "the device behind a gateway does not answer", "that device: supply, address, wiring"),
 }

@@ -14,7 +14,7 @@ from dissectors.frame import Chunk, Damage, Event, Flaw, Frame, LineError, Noise
 from dissectors.line import MS, NS_PER_S, LineSettings
 from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction
-from dissectors.words import milliseconds
+from dissectors.words import milliseconds, percent
 from sniff.analysis.breaks import LEVELS, breaks_in
 from sniff.analysis.echo_findings import EchoesHeard
 from sniff.analysis.judgement import Heard, Judgement
@@ -350,7 +350,7 @@ class LineFindings:
 
     def _rubbish(self) -> Finding:
         share = self._in_frames / self._octets
-        how_many = "not one" if not self._in_frames else "hardly one" if share < 0.005 else f"only {share:.0%}"
+        how_many = "not one" if not self._in_frames else "hardly one" if share < 0.005 else f"only {percent(share, 0)}"
         verb = "are" if self._in_frames and share >= 0.005 else "is"
         words = f"{how_many} of {self._octets} octets {verb} part of a good frame"
         fit = self._other_settings() or self._lacking_bits()
@@ -361,7 +361,7 @@ class LineFindings:
         total = max(1, sum(self._values.values()))
         reports = self._session.adapter.reports
         if self._marked * 10 > self._octets or self._low * 10 > self._octets:
-            words += f"; {self._marked / self._octets:.0%} of all octets have parity or framing errors"
+            words += f"; {percent(self._marked / self._octets, 0)} of all octets have parity or framing errors"
             words += ": the baud rate or the format is wrong, or A and B are swapped"
         elif 2 * extremes > total:
             words += "; most are 00, FF or the like: the baud rate is wrong, or A and B are swapped"
@@ -386,8 +386,8 @@ class LineFindings:
 
     def _parity_setting(self) -> Finding:
         words = (
-            f"{self._marked / self._octets:.0%} of the octets have parity or framing errors, "
-            f"yet {self._in_frames / self._octets:.0%} are in good frames"
+            f"{percent(self._marked / self._octets, 0)} of the octets have parity or framing errors, "
+            f"yet {percent(self._in_frames / self._octets, 0)} are in good frames"
         )
         return replace(self._whole("LN004", "bus", words), count=self._marked, is_once=False)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from dissectors.findings import EVIDENCE_MAX, Finding, Severity, Tally, found
 from dissectors.frame import Event, Frame, Role
 from dissectors.line import NS_PER_S, LineSettings
+from dissectors.words import percent
 from sniff.analysis.holes import Holes
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.engine.session import LineEvent
@@ -147,7 +148,8 @@ class LineUse:
             span = LONG if full >= FULL else SHORT
             average = min(1.0, self._busy / self.heard)
             most = min(1.0, self._most[span])
-            seen = f"octets on the line in {most:.0%} of {span} s at the busiest, {average:.0%} of all time"
+            seen = f"octets on the line in {percent(most, 0)} of {span} s at the busiest, "
+            seen += f"{percent(average, 0)} of all time"
             is_sure = full >= FULL and not self._is_assumed and self._most[span] <= MORE_THAN_ALL
             told = found(
                 RULES["LN401"],
@@ -162,8 +164,8 @@ class LineUse:
         of_time = self._broadcast_busy / self.heard
         if self._broadcast.count >= BROADCASTS_LEAST and share >= BROADCASTS_NOTED and of_time >= BROADCASTS_FELT:
             rate = self._broadcast.count * NS_PER_S / self.heard
-            seen = f"{self._broadcast.count} broadcasts, {share:.0%} of all octets"
-            seen += "" if self._is_assumed else f", {of_time:.0%} of all time"
+            seen = f"{self._broadcast.count} broadcasts, {percent(share, 0)} of all octets"
+            seen += "" if self._is_assumed else f", {percent(of_time, 0)} of all time"
             is_costly = BROADCASTS_TOO_MANY <= share < ONLY_BROADCASTS and of_time >= BROADCASTS_COSTLY
             severity = Severity.WARNING if is_costly and not self._is_assumed else Severity.NOTE
             yield self._broadcast.found(RULES["LN402"], "bus", f"{seen}, {rate:.1f} a second", severity)

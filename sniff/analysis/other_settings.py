@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from dissectors import registry
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
+from dissectors.words import percent
 from sniff.analysis.autodetect import COVERED_LEAST, FOUND_FRAMES, LIKELY_BITS, CandidateEvidence, Candidature
 from sniff.analysis.line_ends import as_sent
 from sniff.analysis.slower_bus import slower_by
@@ -103,7 +104,7 @@ def _by_line_ends(sample: Sequence[Chunk], line: LineSettings, latency: int) -> 
 
 
 def _as_protocol(found: Candidature, how: str, means: str, settle: str) -> Fit:
-    checks = f"{found.frames} frames hold {found.covered:.0%} of {found.octets} octets"
+    checks = f"{found.frames} frames hold {percent(found.covered, 0)} of {found.octets} octets"
     return Fit(f"{how} as {found.protocol} with good checks ({checks})", means, settle)
 
 

@@ -20,6 +20,7 @@ from dissectors import registry
 from dissectors.frame import Chunk, Frame
 from dissectors.line import NS_PER_S, LineSettings, Timing
 from dissectors.manifest import Dissector
+from dissectors.words import percent
 from sniff.analysis.autodetect import (
     BAUDS,
     COVERED_LEAST,
@@ -67,7 +68,7 @@ class Told:
         if reading is None or self.sureness is Sureness.NO:
             return "no protocol makes good frames of its octets"
         frames = "1 good frame holds" if reading.frames == 1 else f"{reading.frames} good frames hold"
-        said = f"{self.sureness.value}: {frames} {reading.covered:.0%} of {reading.octets} octets"
+        said = f"{self.sureness.value}: {frames} {percent(reading.covered, 0)} of {reading.octets} octets"
         if self.sureness is Sureness.SURE:
             said += f", {sureness(reading)}"
         elif reading.frames < FOUND_FRAMES:

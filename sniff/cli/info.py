@@ -11,7 +11,7 @@ from dissectors.findings import counted
 from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.tracker import Verdict
-from dissectors.words import duration, milliseconds
+from dissectors.words import duration, milliseconds, percent
 from sniff.analysis.nodes import Node
 from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.summary import Summary, ranked
@@ -190,7 +190,7 @@ def _print(
     _line("reports", f"line errors: {reports}{'; ' + adapter.detail if adapter.detail else ''}")
     searched = f"{summary.searched} of them while searching, " if summary.searched else ""
     octets = summary.octets + summary.searched
-    load = f"; bus load {summary.load.overall():.1%}" if session.has_times else ""
+    load = f"; bus load {percent(summary.load.overall())}" if session.has_times else ""
     _line("octets", f"{octets}, {searched}{summary.noise} of them noise{load}")
     if foreign is not None:
         many = counted(foreign[1], "frame")

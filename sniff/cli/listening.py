@@ -10,7 +10,7 @@ from functools import partial
 
 from dissectors.findings import counted
 from dissectors.profiles import Devices
-from dissectors.words import milliseconds
+from dissectors.words import milliseconds, percent
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.live import LiveBus
 from sniff.bus.router import Router
@@ -223,7 +223,7 @@ def _say_counts(printer: Printer, bus: str) -> None:
     noise = f", {counted(summary.noise, 'octet')} of noise" if summary.noise else ""
     searched = f", {counted(summary.searched, 'octet')} heard while searching" if summary.searched else ""
     has_times = printer.live.session.has_times  # a file that stands in for a port may have none
-    load = f", bus load {summary.load.overall():.1%}" if has_times else ""
+    load = f", bus load {percent(summary.load.overall())}" if has_times else ""
     print(
         f"sniff485: {bus}{counted(summary.frames, 'frame')} ({summary.damaged} damaged), "
         f"{counted(summary.octets, 'octet')}{noise}{searched}{load}",

@@ -97,3 +97,12 @@ def test_of_usual_buses_nothing_is_said(tap) -> None:  # type: ignore[no-untyped
     for make in (modbus, n2, mstp):
         found = run(Case("", make, (), tap, 40 if make is not mstp else 15)).findings
         assert not {one.code for one in found if one.code.startswith("LN4")}
+
+
+def test_nearly_all_is_not_told_as_all() -> None:
+    use = LineUse(LINE)
+    for tenth in range(200):
+        size, end = OCTETS - 3 * (tenth % 10 == 0), 7 * S + (tenth + 1) * S // 10
+        use.see(tenth, Frame("x", bytes(size), end - size * LINE.char, end, Check.GOOD, FoundBy.GAP), Role.REQUEST)
+    (full,) = use.findings()
+    assert full.seen.endswith("over 99% of all time")
