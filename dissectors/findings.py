@@ -251,7 +251,8 @@ def with_consequences(findings: Iterable[Finding], rules: Mapping[str, Rule]) ->
     explains it of everybody.
     """
     made = list(findings)
-    order = sorted(range(len(made)), key=lambda at: -made[at].severity)
+    # what is wrong with one station explains more of it than what is wrong with the bus
+    order = sorted(range(len(made)), key=lambda at: (-made[at].severity, made[at].about.reaches_all))
     for at in order:
         cause = made[at]
         if cause.cause is not None or cause.severity < Severity.WARNING or cause.code not in rules:
@@ -291,7 +292,7 @@ def _told_once(findings: list[Finding], rules: Mapping[str, Rule]) -> tuple[Find
         is_open = finding.cause is None and not finding.is_told_apart and finding.code in rules
         codes = rules[finding.code].told_by if is_open else ()
         tell = [one for one in standing if codes and one.code.startswith(codes) and one.severity >= finding.severity]
-        same = [one for one in tell if one.about == finding.about]
+        same = [one for one in tell if one.about == finding.about or one.stations == (finding.about.station,)]
         if not same and finding.about.is_whole_bus and len({one.subject for one in tell}) == 1:
             same = tell
         made.append(_told_under(finding, same[0], rules) if same else finding)

@@ -6,9 +6,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 from math import floor, log10, sqrt
 
-from dissectors.findings import Finding, Severity, Tally
+from dissectors.findings import Finding, Severity
 from dissectors.modbus.station_record import Key
-from dissectors.words import duration
 
 
 def wilson(count: int, of: int) -> tuple[float, float]:
@@ -58,22 +57,4 @@ def of_few(finding: Finding) -> Finding:
         means="noise on this station's drop, or anywhere on the line: too few to tell which",
         next="whether it comes again, and with whom; then that station's connector and stub, or termination, bias and "
         "ground",
-    )
-
-
-_AWAY_LEAST = 5
-_AWAY_SHARE = 0.9
-
-
-def was_away(finding: Finding, away: Tally) -> Finding:
-    """The finding of a station that left requests without an answer (`finding.count`), where nearly all of them stand
-    in one row (`away`), after which it was heard again: it was not there, and no single frames were lost."""
-    if away.count < _AWAY_LEAST or not _AWAY_SHARE * finding.count <= away.count <= finding.count:
-        return finding
-    whole = "all" if away.count == finding.count else f"{away.count} of them"
-    return replace(
-        finding,
-        seen=f"{finding.seen}, {whole} in a row within {duration(away.last - away.first)}; then it answered again",
-        means="the station was off, restarted or cut off for that time",
-        next="its supply, plug and terminals, its watchdog and its own log at that time",
     )

@@ -12,7 +12,7 @@ from dissectors.late_speakers import reaching
 from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.exception_meanings import EXCEPTIONS, MAKER_EXCEPTION, USED_ALIKE, VENDOR_EXCEPTION
-from dissectors.modbus.finding_words import note_if, of_few, request_words, share_words, was_away
+from dissectors.modbus.finding_words import note_if, of_few, request_words, share_words
 from dissectors.modbus.functions import EXCEPTIONS as EXCEPTION_NAMES
 from dissectors.modbus.header import code_number
 from dissectors.modbus.response_groups import AnsweredRequest
@@ -34,6 +34,9 @@ FLAWS = {
     Flaw.LAST_SPOILT: "MB006",
 }
 """The rule about each kind of damage that is always the same."""
+
+_AWAY_SHARE = 0.9
+"""So much of what a station left unanswered stands in one row where it was away."""
 
 _NOT_THERE = (1, 2, 3)  # exceptions that tell a program that tries what a device can do
 _PROBED = 8  # times that something else is asked for each try
@@ -115,9 +118,27 @@ def of_missing(seen: BusRecord, unit: int, station: StationRecord, is_scanned: b
         explained += silent.count
     left = missing.count - explained
     if left > 0:
+        away = station.away
+        if station.answered and away.count >= SILENT_AT_END and _AWAY_SHARE * left <= away.count <= left:
+            yield _was_away(name, station)
+            left -= away.count
+    if left > 0:
         words = f"no answer to {left} of {counted(station.asked, 'request')}"
         finding = missing.found(RULES["MB002"], name, words, note_if(seen.rare(left, station.asked)))
-        yield replace(was_away(finding, station.away) if station.answered else finding, count=left)
+        yield replace(finding, count=left)
+
+
+def _was_away(name: str, station: StationRecord) -> Finding:
+    """A station that left nearly all that it left unanswered in one row, and was heard again: no single frames were
+    lost, and no damage of the line explains it."""
+    away = station.away
+    words = f"no answer to {away.count} of {counted(station.asked, 'request')}, in a row within "
+    words += f"{duration(away.last - away.first)}; then it answered again"
+    return replace(
+        away.found(RULES["MB003"], name, words, Severity.WARNING),
+        means="the station was off, restarted or cut off for that time",
+        next="its supply, plug and terminals, its watchdog and its own log at that time",
+    )
 
 
 _RARELY = 20

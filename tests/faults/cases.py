@@ -75,7 +75,7 @@ CASES: tuple[Case, ...] = (  # of each a capture is kept in captures/findings
     Case(
         "RTU station away for a while",
         partial(modbus, change={2: partial(Dies, at=20 * S, until=26 * S)}),
-        (("MB002", "station 2"),),
+        (("MB003", "station 2"),),
     ),
     Case("RTU function ignored", partial(modbus, change={2: partial(Ignores, function=4)}), (("MB004", "station 2"),)),
     Case("RTU exception 2", partial(modbus, extra=(read_holding(1, 100, 2),)), (("MB008", "station 1"),)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -149,11 +150,29 @@ def test_a_value_that_was_written_is_no_failed_sensor() -> None:
 
 
 def test_a_station_that_was_away_for_a_while_lost_no_single_frames() -> None:
-    one = found("rtu-station-away-for-a-while", "MB002")
-    assert "all in a row within 5.47 s; then it answered again" in one.seen
+    one = found("rtu-station-away-for-a-while", "MB003")
+    assert one.severity is Severity.WARNING
+    assert "in a row within 5.47 s; then it answered again" in one.seen
     assert "loose wire" not in one.means
     assert "loose wire" in found("rtu-slow-station", "MB002").means
 
 
 def test_what_is_for_everybody_is_not_called_a_station() -> None:
     assert "comes back to address 0 (" in found("line-many-broadcasts", "MB401").seen
+
+
+def test_damage_of_one_station_of_which_nothing_tells_whose_it_is_names_it_once() -> None:
+    rules = all_rules()
+    damage = replace(found_by(rules["MB007"], "bus", "", count=4), stations=(1,))
+    for station, is_told in ((1, True), (2, False)):
+        line = found_by(rules["LN101"], f"station {station}", "", count=4)
+        assert (with_consequences((line, damage), rules)[0].cause == ("MB007", "bus")) is is_told
+
+
+def test_damage_of_the_line_does_not_explain_a_station_that_was_away() -> None:
+    rules = all_rules()
+    away = found_by(rules["MB003"], "station 2", "", count=39, severity=Severity.WARNING)
+    repeats = found_by(rules["MB104"], "station 2", "", count=20)
+    _, of_station, of_repeats = with_consequences((found_by(rules["MB007"], "bus", ""), away, repeats), rules)
+    assert of_station.cause is None
+    assert of_repeats.cause == ("MB003", "station 2")  # its own trouble explains more of it than the bus's
