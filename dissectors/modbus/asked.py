@@ -76,6 +76,11 @@ class AskedRequest:
         return self.unit == BROADCAST and self.header.role is Role.REQUEST and self.header.ok
 
     @property
+    def beyond(self) -> str | None:
+        """What it asks for that no request may, in words; damage alone may say that."""
+        return beyond_limits(self.octets) if self.header.ok else None
+
+    @property
     def fault(self) -> str | None:
         """What it says that contradicts itself, though its check is good."""
         return self.header.error if self.header.ok and not self.octets[1] & EXCEPTION_BIT else None

@@ -3,6 +3,7 @@
     01 03 00 10 00 02          01 00 01              a function that nobody asks for
     01 10 00 10 00 01 02 0007  01 06 00 10 00 07     the same address, by another function that writes
     01 03 00 10 00 02          01 03 03 00 07 00     as a request it would ask for more than there is
+    01 04 00 10 00 02          01 05 04 0007 0008    by another function, and as long as none of its requests
     01 06 00 05 00 01          02 03 00 00 00 01     01 06 00 05 00 01     02 03 02 00 07
                                └ to another station  └ the late answer, and no request: 02 was still waited for
 
@@ -17,7 +18,7 @@ from dissectors.modbus.exchanges import Exchanges
 from dissectors.modbus.functions import FUNCTIONS
 from dissectors.modbus.limits import beyond_limits
 from dissectors.modbus.notation import HEAD
-from dissectors.modbus.pairing import mismatch
+from dissectors.modbus.pairing import another_function, mismatch
 from dissectors.modbus.promptness import AT_ONCE, Promptness, has_no_layout
 
 _ADDRESS_END = HEAD + 2
@@ -37,6 +38,8 @@ class OddAnswers:
         code, asked = seen.header.function, request.octets[1]
         if code == asked:
             return False
+        if _has_a_length_of_none(seen):
+            return True
         function = FUNCTIONS.get(code) if code is not None else None
         if function is None:
             return (request.unit, seen.octets[1]) not in self._held.makers
@@ -45,14 +48,15 @@ class OddAnswers:
 
     def misshapen(self, request: Exchange, seen: Seen) -> str | None:
         """Why a frame is not the answer that was asked for, where it is one and looks like a request; None else."""
-        if request.unit != seen.unit or not request.is_for(seen.octets) or not self._may_be_answered(request, seen):
+        if request.unit != seen.unit or not self._may_be_answered(request, seen):
             return None
+        if not request.is_for(seen.octets):
+            return another_function(request.octets, seen.octets) if _has_a_length_of_none(seen) else None
         if FUNCTIONS[request.octets[1]].writes:
             return None
         if seen.header.error is not None:
             return seen.header.error
-        counted = len(seen.octets) > HEAD and len(seen.octets) == HEAD + 1 + seen.octets[HEAD]
-        return mismatch(request.octets, seen.octets) if counted and beyond_limits(seen.octets) is not None else None
+        return mismatch(request.octets, seen.octets) if beyond_limits(seen.octets) is not None else None
 
     def _may_be_answered(self, request: Exchange, seen: Seen) -> bool:
         is_plain = request.sure and not (request.fault or request.garble or request.request.header.error)
@@ -99,6 +103,12 @@ class OddAnswers:
         late = self.learn(between, answered)
         is_waited_for = late is not None and (late.waited or 0) >= max(AT_ONCE, 2 * answered.waited)
         return (late, answered) if late is not None and is_waited_for else None
+
+
+def _has_a_length_of_none(seen: Seen) -> bool:
+    """Whether a good frame is as long as neither a request nor an answer of its function is."""
+    frame, header = seen.frame, seen.header
+    return header.ok and header.error is not None and frame.expected not in (None, len(frame.octets))
 
 
 def _may_answer(request: Exchange, seen: Seen) -> bool:

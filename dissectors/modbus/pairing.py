@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from dissectors.modbus.functions import EXCEPTION_BIT, ITEMS_ASKED
 from dissectors.modbus.layout import MESSAGES, SUB_FUNCTIONS
-from dissectors.modbus.notation import HEAD, Group, Means, Messages, counted, first, places
+from dissectors.modbus.notation import CHECK, HEAD, Group, Means, Messages, counted, first, places
 from dissectors.modbus.ranges import SINGLE_WRITES
 
 _Rule = Callable[[bytes, bytes], str | None]
@@ -65,7 +65,10 @@ def _of(count: int, thing: str) -> str:
 
 def _byte_count(response: bytes, expected: int, asked: str) -> str | None:
     there = response[HEAD] if len(response) > HEAD else 0
-    return None if there == expected else f"{_of(there, 'data octet')} for {asked} asked for, expected {expected}"
+    if there != expected:
+        return f"{_of(there, 'data octet')} for {asked} asked for, expected {expected}"
+    size, own = len(response) + CHECK, HEAD + 1 + there + CHECK
+    return None if size == own else f"{size} octets where its own count makes it {own}"
 
 
 def _copy(request: bytes, response: bytes) -> str | None:

@@ -74,3 +74,10 @@ def test_a_damaged_request_does_not_say_what_was_asked(bus):
         bus.exchange(OTHER, OTHER_VALUES)
         bus.damage("010300000002", 40, at=4).say("018303")  # 4098 registers, as it is
     assert not [one for one in findings_of(bus) if one.code == "MB016"]
+
+
+def test_what_damage_makes_of_a_request_is_not_the_masters(bus):
+    for _ in range(6):
+        bus.exchange(OTHER, OTHER_VALUES).exchange("010300900001", "018302")
+    bus.damage("010300900001", 40, at=4).say("018302", 8).exchange(OTHER, OTHER_VALUES)
+    assert graves_of(bus) == {("MB008", "station 1")}
