@@ -84,8 +84,3 @@ class AskedRequest:
     def fault(self) -> str | None:
         """What it says that contradicts itself, though its check is good."""
         return self.header.error if self.header.ok and not self.octets[1] & EXCEPTION_BIT else None
-
-    @property
-    def beyond(self) -> str | None:
-        """What it asks for that nobody can have; None where its check is bad, for nobody knows what was asked then."""
-        return beyond_limits(self.octets) if self.header.ok else None

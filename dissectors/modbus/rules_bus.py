@@ -15,8 +15,9 @@ from dissectors.modbus.odd_ends import OddEnd
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.rules_late import of_impatience, of_late_speakers, under_late_answers
 from dissectors.modbus.rules_of_answers import RELAYED
-from dissectors.modbus.rules_station import FLAWS, is_absent, of_missing, of_station, wrongly_checked
+from dissectors.modbus.rules_station import FLAWS, SPOILT, is_absent, of_missing, of_station, wrongly_checked
 from dissectors.modbus.rules_unheard import of_unheard
+from dissectors.modbus.struck_octet import falls_there_by_chance
 from dissectors.words import duration, fine_milliseconds, percent
 
 _WASTE = 0.05
@@ -193,7 +194,8 @@ def _of_requests(seen: BusRecord) -> Iterator[Finding]:
     # where not one is good and all that can be put right have one flaw, the others are two in one read
     of = 4 if damaged == seen.requests and len(flaws) == 1 else 2
     for flaw, tally in flaws.items():
-        if tally.count >= _CUT_LEAST and of * tally.count >= damaged:
+        is_chance = flaw in SPOILT and falls_there_by_chance(seen, "master", tally.count, damaged)
+        if tally.count >= _CUT_LEAST and of * tally.count >= damaged and not is_chance:
             words = f"{counted(tally.count, 'request')} good but for one thing: {flaw.value}"
             severity = note_if(seen.rare(tally.count, seen.requests))
             if tally.count == seen.requests:

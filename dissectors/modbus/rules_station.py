@@ -18,6 +18,7 @@ from dissectors.modbus.header import code_number
 from dissectors.modbus.response_groups import AnsweredRequest
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.station_record import Key, Requested, StationRecord
+from dissectors.modbus.struck_octet import falls_there_by_chance
 from dissectors.modbus.talked_over import second_voice
 from dissectors.words import duration, fine_milliseconds, percent
 from dissectors.wrong_checks import Habit
@@ -37,6 +38,9 @@ FLAWS = {
 
 _AWAY_SHARE = 0.9
 """So much of what a station left unanswered stands in one row where it was away."""
+
+SPOILT = (Flaw.FIRST_SPOILT, Flaw.LAST_SPOILT)
+"""Those that noise makes as well; it takes no octet away."""
 
 _NOT_THERE = (1, 2, 3)  # exceptions that tell a program that tries what a device can do
 _PROBED = 8  # times that something else is asked for each try
@@ -163,7 +167,8 @@ def _damaged(seen: BusRecord, unit: int, station: StationRecord, is_common: bool
     if not damaged.count or is_absent(station):
         return
     rare = seen.rare(damaged.count, station.asked)
-    if ends.count >= 3 and 2 * ends.count >= damaged.count:
+    is_chance = falls_there_by_chance(seen, name, ends.count, damaged.count)
+    if ends.count >= 3 and 2 * ends.count >= damaged.count and not is_chance:
         words = f"{ends.count} of {counted(station.asked, 'answer')} right but for the last octet"
         yield ends.found(RULES["MB006"], name, words, note_if(rare))
         if 4 * ends.count >= 3 * damaged.count:
@@ -229,6 +234,9 @@ def _flawed(seen: BusRecord, name: str, station: StationRecord) -> Iterator[Find
         if code == "MB012" and seen.cut_by_master:
             continue
         if count < _SYSTEM_LEAST or 2 * count < station.damaged.count:
+            continue
+        spoilt = sum(tally.count for flaw, tally in parts if flaw in SPOILT)
+        if count < _SYSTEM_LEAST + spoilt and falls_there_by_chance(seen, name, count, station.damaged.count):
             continue
         flaw, tally = max(parts, key=lambda part: part[1].count)
         words = f"{count} of {counted(station.asked, 'answer')} good but for one thing: {flaw.value}"
