@@ -5,7 +5,7 @@ Evidence is counted in bits. A candidate brings those of its octets (candidates.
     +4  silence proved at its start, at its end; or a good frame directly before it
     +2  silence of 1.5 characters proved there
     +4  a station that has been heard before
-    +2 … +14  it answers the open request, or repeats it (open_request.py)
+    +2 … +14  it answers the open request, or repeats it, or asks the next unit the same (open_request.py)
     +6 … +14  this station was asked the same before, or answered at this length (past.py)
     -6  each silence proved inside it
 
@@ -35,7 +35,7 @@ from typing import Final, NamedTuple, Protocol
 from dissectors.modbus.candidates import ANY_END, ZERO_TAIL, Candidate, Pending
 from dissectors.modbus.functions import EXCEPTION_BIT
 from dissectors.modbus.lengths import MIN_FRAME, MORE
-from dissectors.modbus.open_request import LOOSE, REPEATED, SAME_UNKNOWN, Expected, expectation
+from dissectors.modbus.open_request import LOOSE, REPEATED, SAME_UNKNOWN, SEARCHED, Expected, expectation
 from dissectors.modbus.past import KNOWN_LENGTH, Past
 from dissectors.modbus.ranges import AGREEMENTS
 
@@ -206,6 +206,8 @@ class Paths:
             fit, asked = known, False
             if expected is not None and expected.is_for(octets, 0):
                 fit, asked = expected.fit(octets, response), True
+            elif expected is not None and request and expected.is_searched_on(octets):
+                fit = SEARCHED
             if request and fit < REPEATED and octets == step.asked:
                 fit = REPEATED
             own = bits + (fit if fit > known else known)

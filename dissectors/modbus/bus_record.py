@@ -182,13 +182,15 @@ class BusRecord:
         return sorted(cut) if len(cut) >= _CUT_LEAST and all(_usual(one) > latest for one in others) else []
 
     def unheard(self) -> list[int]:
-        """Stations whose answers this tap missed, by what the master did: all, where none is heard of any."""
+        """Stations whose answers this tap missed, by what the master did: all, where none is heard of any. Of addresses
+        that it was only searching, nothing tells that somebody is there."""
         asked = {unit: one for unit, one in self.stations.items() if one.missing.count >= _UNHEARD_LEAST}
         if len(asked) > 1 and not any(one.repeats.count for one in asked.values()) and self.hears_nobody:
             return sorted(asked)
         if self.rhythm.is_by_the_clock:
             return []
-        return sorted(unit for unit, one in self.stations.items() if one.is_unheard)
+        searched = self.scanned()
+        return sorted(unit for unit, one in self.stations.items() if one.is_unheard and unit not in searched)
 
     @property
     def hears_nobody(self) -> bool:

@@ -16,6 +16,7 @@ from dissectors.modbus.functions import (
     answer_length,
 )
 from dissectors.modbus.lengths import Octets
+from dissectors.modbus.notation import CHECK
 
 EXACT = 14
 """Bits that an answer of the right station, function and length is worth."""
@@ -33,6 +34,10 @@ SAME_UNKNOWN = 14
 """Bits for a station and a function of unknown layout that were named just before: nothing else makes them likely."""
 
 
+SEARCHED = 8
+"""Bits for the open request once more, octet for octet, to the unit behind: a master that looks who is there."""
+
+
 class Expected(NamedTuple):
     """A request without an answer yet. `length`: octets of its normal answer, None when only its data tell."""
 
@@ -45,10 +50,14 @@ class Expected(NamedTuple):
         """Whether the head at `start` names the station and the function asked, as an exception or not."""
         return octets[start] == self.unit and octets[start + 1] & ~EXCEPTION_BIT == self.function
 
+    def is_searched_on(self, octets: bytes) -> bool:
+        """Whether a frame asks the unit behind for the same, which nobody does who waits for this one."""
+        return octets[0] == self.unit + 1 and octets[1:-CHECK] == self.octets[1:-CHECK]
+
     def fit(self, octets: bytes, response: bool) -> int:
         """Bits that a complete frame gains from being expected (0: it is not); `response`: whether it can be one."""
         if octets[0] != self.unit:
-            return 0
+            return SEARCHED if self.is_searched_on(octets) else 0
         code, length = octets[1], len(octets)
         if code == self.function | EXCEPTION_BIT:
             return EXACT if length == EXCEPTION_LENGTH else 0
