@@ -11,6 +11,7 @@ AT_ONCE = 50_000_000
 """ns; no master repeats a request sooner, unless its timeout is known to be that short."""
 
 _INTERFACES = 0x2B
+_SPOILT_MOST = 2  # octets of a repeat
 
 
 def has_no_layout(seen: Seen) -> bool:
@@ -71,3 +72,12 @@ class Promptness:
         if garble.is_whole:
             return silence + max(self._latency, seen.frame.slack) >= self._silence
         return not self.knows(request) and silence >= self._learnt.too_soon(self._silence)
+
+    def is_spoilt_repeat(self, request: Exchange, seen: Seen) -> bool:
+        """Whether a damaged frame is the request again, all but an octet or two, when the master has given up: later
+        than that station answers, and as late as other repeats come."""
+        asked, said = request.octets, seen.octets
+        if len(asked) != len(said) or sum(one != other for one, other in zip(asked, said, strict=True)) > _SPOILT_MOST:
+            return False
+        gap = request.gap(seen.frame.start)
+        return self._learnt.is_timeout(gap) and not self._learnt.in_time(request.unit, request.pace, gap)

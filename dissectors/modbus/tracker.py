@@ -331,7 +331,7 @@ class ModbusTracker(TrackerMemory):
             nobodys = seen.unit not in self._units and self.learnt.fastest(request.unit) is not None
             return (seen.unit == request.unit or nobodys) and self._times.is_prompt(request, seen)
         if request.is_for(seen.octets) and (request.garble is None or seen.header.role is Role.RESPONSE):
-            return True
+            return not self._times.is_spoilt_repeat(request, seen)
         return self._times.in_time(request, seen) and not names_another(seen, request.unit, self._units)
 
     def _as_named(self, seen: Seen) -> Seen:
