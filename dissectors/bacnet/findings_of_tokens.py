@@ -45,7 +45,17 @@ def tokens(ring: Ring) -> Iterable[Remark]:
         yield Remark(who[0] if len(who) == 1 else None, of("MS104", None, seen, together).finding)
     for mac, node in ring.nodes.items():
         if node.polls_sent > ALONE_POLLS and not node.tokens_sent and not node.tokens_received:
-            yield plain("MS109", ring, mac, f"{counted(node.polls_sent, 'poll')} for masters and not one token")
+            yield _alone(ring, mac, node.polls_sent)
+
+
+def _alone(ring: Ring, mac: int, polls: int) -> Remark:
+    """A master without others; where slaves answer it, both directions of its line are sound."""
+    answers = sum(other.replies for one, other in ring.nodes.items() if one != mac)
+    seen = f"{counted(polls, 'poll')} for masters and not one token"
+    if not answers:
+        return plain("MS109", ring, mac, seen)
+    seen += f"; {counted(answers, 'answer')} to what it asked came from stations that are no masters"
+    return plain("MS109", ring, mac, seen, severity=Severity.NOTE)
 
 
 def silences(ring: Ring) -> Iterable[Remark]:

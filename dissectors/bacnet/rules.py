@@ -98,7 +98,8 @@ _ALL = (
         "MS109",
         Severity.WARNING,
         "alone on the bus",
-        "A station polls for masters all the time and never passes a token: nobody answers it.",
+        "A station polls for masters all the time and never passes a token: nobody answers it. Only noted where slaves "
+        "answer what it asks.",
         "it is the only master, or it does not hear the others",
         "wiring and polarity between this station and the next; baud rates",
     ),

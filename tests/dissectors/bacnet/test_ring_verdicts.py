@@ -450,3 +450,15 @@ def test_a_late_answer_with_the_same_id_is_the_station_s_own():
         steps += [(4, data(19, 3, VALUE)), (3, token(3, 12)), (2, token(12, 19)), (2, token(19, 3))]
     read = script(steps)
     assert read.graves() == {("MS302", "3 → 19")}
+
+
+def test_a_master_alone_with_its_slaves_is_only_noted():
+    """They answer, so the line is sound in both directions, and there is no other master."""
+    steps: list[Step] = []
+    for turn in range(260):
+        steps += [(2, data(3, 130, READ, expects=True)), (8, data(130, 3, VALUE))] if turn % 50 == 0 else []
+        steps.append((27, poll(3, (3 + turn % 127 + 1) % 128)))
+    read = script(steps)
+    assert read.graves() == set()
+    assert read.of("MS109").severity is Severity.NOTE
+    assert "6 answers to what it asked" in read.of("MS109").seen
