@@ -309,7 +309,7 @@ _ALL = (
         "but for their last octet or two, which are missing or wrong.",
         "its driver is switched off too early, before the last octet is out",
         "the turnaround or transmit-delay setting of that station, its firmware, its converter's direction control",
-        explains=("MS401", "MS402", "MS102", "MS301", "LN101", "LN2"),
+        explains=("MS401", "MS402", "MS102", "MS108", "MS201", "MS301", "LN101", "LN2"),
     ),
     Rule(
         "MS406",

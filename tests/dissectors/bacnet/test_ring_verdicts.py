@@ -7,7 +7,9 @@ import pytest
 from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.ring_events import RingEventKind
-from dissectors.findings import Severity
+from dissectors.bacnet.rules import RULES
+from dissectors.findings import Severity, with_consequences
+from dissectors.findings import found as found_by_rule
 from dissectors.frame import Flaw, Frame
 from dissectors.line import LineSettings, Timing
 from dissectors.tracker import Verdict
@@ -462,3 +464,13 @@ def test_a_master_alone_with_its_slaves_is_only_noted():
     assert read.graves() == set()
     assert read.of("MS109").severity is Severity.NOTE
     assert "6 answers to what it asked" in read.of("MS109").seen
+
+
+def test_what_cut_tokens_and_polls_cost_stands_under_them():
+    """Nobody can use or answer them: their sender polls on, and the rounds get longer."""
+    made = [
+        found_by_rule(RULES[code], subject, "", first=0, last=1)
+        for code, subject in (("MS108", "bus"), ("MS201", "MAC 9"), ("MS201", "MAC 5"), ("MS405", "MAC 9"))
+    ]
+    caused = {(one.code, one.subject) for one in with_consequences(made, RULES) if one.cause == ("MS405", "MAC 9")}
+    assert caused == {("MS108", "bus"), ("MS201", "MAC 9")}
