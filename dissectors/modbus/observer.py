@@ -42,9 +42,9 @@ class ModbusFindings(RowObserver):
 
     def settle(self, transaction: Transaction) -> None:
         """See `dissectors.findings.Judge`."""
+        self.settle_copy(transaction)
         asked = self.asked.pop(transaction.id, None)
-        code = self.codes.pop(transaction.id, None)
-        answer = self.answers.pop(transaction.id, b"")
+        code, answer = self.codes.pop(transaction.id, None), self.answers.pop(transaction.id, b"")
         stray, flaw = self.stray.pop(transaction.id, b""), self.flaws.pop(transaction.id, None)
         ended = self.bad_ends.pop(transaction.id, None)
         if (second := self.seconds.pop(transaction.id, None)) is not None and transaction.verdict is not Verdict.OPEN:

@@ -81,6 +81,7 @@ class Remembered:
         self.repeats: deque[int] = deque(maxlen=64)  # the last transactions that repeated another
         self.copied: deque[int | None] = deque(maxlen=64)  # the last transactions whose request came twice at once
         self.no_requests: deque[int] = deque(maxlen=64)  # frames that the tracker takes for requests, but are none
+        self.copies_of_broadcast: dict[int, tuple[int, AskedRequest]] = {}  # by row; that of the broadcast
         self.damaged: deque[int] = deque(maxlen=64)  # transactions of the last damaged answers
         self.rubbish = -1  # the newest row of so many octets that are no frame that they may have been a request
         self.before_all: int | None = None  # the row of the first answer, if no request came before it

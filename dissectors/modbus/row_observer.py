@@ -119,14 +119,33 @@ class RowObserver(Remembered):
     def _is_no_request(self, asked: AskedRequest) -> bool:
         """Whether it is an answer in the shape of a request: to a broadcast, or by another unit than the one asked."""
         if self.broadcast is not None and self._is_answer_to_broadcast(asked):
-            self.seen.answers_to_broadcast.add(asked.frame.start, self.broadcast.no, asked.no)
-            self.seen.broadcast_answers[asked.unit] += 1
+            self.copies_of_broadcast[asked.no] = self.broadcast.no, asked
+            if asked.unit == BROADCAST or len(self.copies_of_broadcast) > OPEN_KEPT:
+                self._count_copy(next(iter(self.copies_of_broadcast)))
             return True
         if self.open is not None and self._is_answer_of_another(self.open, asked):
             self.seen.pair((self.open.unit, asked.unit)).add(asked.frame.start, self.open.no, asked.no)
             self.elsewhere[self.open.no] = asked.unit
             return True
         return False
+
+    def settle_copy(self, transaction: Transaction) -> None:
+        """What says the same as the broadcast before it: a station's answer to that, or a request that has its own."""
+        no = transaction.request or transaction.response or 0
+        if no not in self.copies_of_broadcast or transaction.verdict is Verdict.OPEN:
+            return
+        if transaction.request == no and transaction.response is not None:
+            del self.copies_of_broadcast[no]
+            self.seen.requests += 1
+            if no in self.no_requests:
+                self.no_requests.remove(no)
+        else:
+            self._count_copy(no)
+
+    def _count_copy(self, no: int) -> None:
+        before, said = self.copies_of_broadcast.pop(no)
+        self.seen.answers_to_broadcast.add(said.frame.start, before, no)
+        self.seen.broadcast_answers[said.unit] += 1
 
     def waited_in_vain(self, before: AskedRequest, asked: AskedRequest) -> None:
         """A request after another that nothing has followed."""
@@ -196,7 +215,8 @@ class RowObserver(Remembered):
         if broadcast is None or asked.octets[1:] != broadcast.octets[1:] or (self.seen.echoes and not asked.unit):
             return False
         gap = asked.frame.start - broadcast.frame.end
-        return self.timing.char + self.timing.latency < gap < TURNAROUND
+        soonest = 0 if asked.unit else self.timing.char + self.timing.latency  # an echo names all, as what it repeats
+        return soonest <= gap < TURNAROUND
 
     def _is_answer_of_another(self, before: AskedRequest, asked: AskedRequest) -> bool:
         """Whether what looks like a request is the copy of the one before it, by a unit that is known to answer so."""
