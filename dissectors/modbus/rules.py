@@ -170,7 +170,8 @@ _ALL = (
         Severity.NOTE,
         "answers that nobody asked for",
         "Answers without a request before them. A warning from three on and 1 in 100 of all answers, without those "
-        "directly behind octets that are no frame: these were the request.",
+        "directly behind octets that are no frame: these were the request. Where most answers come so, those that do "
+        "not fit (MB010, MB206) stand under it.",
         "requests that this tap does not hear, or a second bus coupled in",
         "whether the tap is at a place where the master is heard well",
         explains=_OF_ANOTHER_TALKER,

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
-from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, found, times, together
+from dissectors.findings import Finding, Severity, Tally, counted, found, times, together
 from dissectors.late_speakers import MASTER
 from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
@@ -16,7 +16,7 @@ from dissectors.modbus.rules import RULES
 from dissectors.modbus.rules_late import of_impatience, of_late_speakers, under_late_answers
 from dissectors.modbus.rules_of_answers import RELAYED
 from dissectors.modbus.rules_station import FLAWS, SPOILT, is_absent, of_missing, of_station, wrongly_checked
-from dissectors.modbus.rules_unheard import of_unheard
+from dissectors.modbus.rules_unheard import of_unheard, under_what_is_missed
 from dissectors.modbus.struck_octet import falls_there_by_chance
 from dissectors.words import duration, fine_milliseconds, percent
 
@@ -48,7 +48,7 @@ def judge(seen: BusRecord, timeout: int | None) -> tuple[Finding, ...]:
         if unit not in unheard:
             made += of_missing(seen, unit, station, unit in scanned)
         made += of_station(seen, unit, station, timeout, f"station {unit}" not in damage.blamed)
-    return tuple(under_late_answers(tuple(_lost_alike(made, seen.damaged_here.count)), seen))
+    return tuple(under_late_answers(tuple(under_what_is_missed(seen, made)), seen))
 
 
 # ---- the bus
@@ -118,15 +118,6 @@ def _damaged_here(seen: BusRecord, requests: int) -> Iterator[Finding]:
         words = f"{damaged.count} of {counted(requests, 'request')} damaged here, and answered all the same"
         rare = seen.rare(damaged.count, requests) or 4 * others > damaged.count
         yield damaged.found(RULES["MB022"], "bus", words, note_if(rare))
-
-
-def _lost_alike(made: Sequence[Finding], damaged_here: int) -> Iterator[Finding]:
-    """The findings; where requests arrive damaged here, a station that leaves out no more than that may have got as
-    many of them damaged: the loss is under that finding."""
-    cause = next((one for one in made if one.code == "MB022" and one.severity >= Severity.WARNING), None)
-    for one in made:
-        is_alike = cause is not None and one.code == "MB002" and one.count <= damaged_here
-        yield as_consequence(one, cause, RULES) if cause is not None and is_alike else one
 
 
 def _cut_by_master(seen: BusRecord) -> Iterator[Finding]:

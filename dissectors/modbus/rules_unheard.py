@@ -1,11 +1,11 @@
-"""The rule of answers that this tap does not hear, in words: what the master does tells that they came. Pure."""
+"""What this tap does not hear: the rule of such answers, which the master's doings tell, and what comes of it. Pure."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from dissectors.findings import Finding, Severity, counted, together
+from dissectors.findings import Finding, Severity, as_consequence, counted, together
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.finding_words import note_if, units
 from dissectors.modbus.rules import RULES
@@ -35,3 +35,25 @@ def of_unheard(seen: BusRecord, unheard: Sequence[int]) -> Iterator[Finding]:
     if never and not seen.hears_nobody:  # nothing that it sent proves that it is there
         finding = replace(finding, means=f"{_NOT_HEARD}; or {units(never)} off, of a master that waits no longer")
     yield finding
+
+
+def under_what_is_missed(seen: BusRecord, made: Sequence[Finding]) -> Iterator[Finding]:
+    """The findings; what a tap makes of good stations when it hears the master badly stands under that.
+
+    Where requests arrive damaged here, a station that leaves out no more than that may have got as many of them
+    damaged. Where most answers come unasked, a confirmed write stands for a request, and the next answer does not fit.
+    """
+    graves = {one.code: one for one in made if one.severity >= Severity.WARNING}
+    damaged, unasked = graves.get("MB022"), graves.get("MB207")
+    if unasked is not None and 2 * unasked.count <= seen.answers:
+        unasked = None
+    for one in made:
+        if damaged is not None and one.code == "MB002" and one.count <= seen.damaged_here.count:
+            yield as_consequence(one, damaged, RULES)
+        elif unasked is not None and one.code in _OF_WRONG_REQUESTS:
+            yield as_consequence(one, unasked, RULES)
+        else:
+            yield one
+
+
+_OF_WRONG_REQUESTS = ("MB010", "MB206")
