@@ -10,7 +10,7 @@ from dissectors.findings import Finding, Severity, Tally, as_consequence, counte
 from sniff.analysis.breaks import LEVELS
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.sender_findings import BUS, MASTER, NoteIf, Senders
-from sniff.analysis.shares import standing_out
+from sniff.analysis.shares import only_struck, standing_out
 
 INSTEAD_LEAST, INSTEAD = 3, 0.7
 """So many stray octets, and of all of them, in place of one station's answers: they are its own."""
@@ -21,6 +21,7 @@ def strays_found(senders: Senders, instead: Counter[str], note_if: NoteIf) -> It
     came in place of an answer, by the station that was asked."""
     own: list[tuple[str, str]] = []
     common: dict[str, list[str]] = {"LN201": [], "LN202": []}
+    only: dict[str, bool] = {}  # whether chance would hardly have struck one sender alone
     for code, names in common.items():
         counts = {
             name: (one.stray[code].count if code in one.stray else 0, float(one.frames))
@@ -28,6 +29,7 @@ def strays_found(senders: Senders, instead: Counter[str], note_if: NoteIf) -> It
             if name != BUS
         }
         out = standing_out(counts, MASTER)
+        only[code] = len(counts) == 1 or bool(only_struck(counts))
         if not senders.beside:  # what lies in the silence before it asks is no sign of the master
             out.discard(MASTER)
         own += [(name, code) for name in sorted(out)]
@@ -41,7 +43,7 @@ def strays_found(senders: Senders, instead: Counter[str], note_if: NoteIf) -> It
         alone = names[0] if len(names) == 1 else BUS
         if code == "LN201" and alone == MASTER and not senders.beside:
             continue
-        if alone != BUS and 2 * among[code].count > total:  # nobody else is struck
+        if alone != BUS and only[code] and 2 * among[code].count > total:  # nobody else is struck
             own += [(names[0], code)]
             total -= among.pop(code).count
     of_own = 0
