@@ -19,7 +19,6 @@ from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.learned_timing import READ
 from dissectors.modbus.limits import ILLEGAL
 from dissectors.modbus.pairing import is_answer
-from dissectors.modbus.poll_order import Neighbours
 from dissectors.modbus.remembered import FINAL_KEPT, LOST_KEPT, OPEN_KEPT, SLOW_UNLEARNT, Unfit, slow_limit
 from dissectors.modbus.response_groups import AnsweredRequest
 from dissectors.modbus.row_observer import AT_ONCE, STRAY_KEPT, RowObserver
@@ -276,9 +275,10 @@ class ModbusFindings(RowObserver):
             else:
                 self.seen.malformed_codes[code or 0] += 1
         elif transaction.error is not None and asked.header.ok and self._is_unfit(transaction, asked, code, answer):
-            if is_disturbed and (ways_round := self._answers_another(transaction, asked, answer)):
-                self.seen.cross(ways_round, transaction.end, transaction.request, transaction.response)
-                return
+            if is_disturbed and (ways_round := self.seen.cycles.beside(asked.in_list, answer)):
+                if self._is_within_a_turn(transaction, asked):
+                    self.seen.cross(ways_round, transaction.end, transaction.request, transaction.response)
+                return  # its own request is in the octets before
             unfit = Unfit(station, transaction, answer)
             if self.timing.latency < AT_ONCE or asked.header.role is Role.REQUEST:
                 unfit.count()
@@ -305,12 +305,10 @@ class ModbusFindings(RowObserver):
             return True
         return bool(answer) and not is_answer(asked.octets, answer)
 
-    def _answers_another(self, transaction: Transaction, asked: AskedRequest, answer: bytes) -> tuple[Neighbours, ...]:
-        """What an answer fits besides that came too soon for a turn: octets before hide its request, or it is late."""
+    def _is_within_a_turn(self, transaction: Transaction, asked: AskedRequest) -> bool:
+        """Whether an answer came too soon for another request to have been asked and answered since."""
         turn = self.learnt.turn(asked.unit, asked.answer_time(self.timing.char))
-        if turn is None or transaction.latency is None or transaction.latency.nominal > turn[1]:
-            return ()
-        return self.seen.cycles.beside(asked.in_list, answer)
+        return turn is not None and transaction.latency is not None and transaction.latency.nominal <= turn[1]
 
     def _compare_with_timeout(self, station: StationRecord, transaction: Transaction, least: int) -> None:
         """Whether an answer took long; counted anew when the timeout gets known, since the limit is another then."""
