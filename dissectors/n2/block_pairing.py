@@ -26,9 +26,11 @@ from dissectors.columns import (
 from dissectors.frame import Frame, Role
 from dissectors.n2.commands import parse_command
 from dissectors.n2.envelope import ANSWER, COMMAND
+from dissectors.n2.exchange import GIVE_UP
 from dissectors.n2.forms import may_answer
 from dissectors.n2.header import BROADCAST
-from dissectors.n2.tracker import FEW, GIVE_UP, N2Tracker
+from dissectors.n2.station_times import FEW
+from dissectors.n2.tracker import N2Tracker
 from dissectors.tracker import Verdict
 
 if TYPE_CHECKING:

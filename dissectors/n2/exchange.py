@@ -5,9 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from dissectors.frame import Frame
+from dissectors.line import NS_PER_S
 from dissectors.n2.commands import parse_command
 from dissectors.n2.forms import fits, may_answer
 from dissectors.tracker import Transaction, Verdict
+
+GIVE_UP = 3 * NS_PER_S
+"""Longest time that a master waits for an answer, ns (upper end of the NAE's setting; digimat.n2's default)."""
+
+_LATE_LEAST = NS_PER_S
+_TIMES_THE_WAIT = 4
 
 
 @dataclass(slots=True)
@@ -31,7 +38,13 @@ class Exchange:
     answer_end: int = 0
     gap: int | None = None  # ns from the end of the same command before it, where it is that one again
     echoed: bool = False
+    waited: int = GIVE_UP  # ns, until the master went on
     known_answers: int = 0  # of its station when it was closed without one
+
+    @property
+    def owed_for(self) -> int:
+        """How long after it an answer may still be its late one, ns: some times as long as the master waited."""
+        return min(2 * GIVE_UP, max(_LATE_LEAST, _TIMES_THE_WAIT * self.waited))
 
     @property
     def is_owed(self) -> bool:

@@ -147,6 +147,7 @@ RULES: dict[str, Rule] = {
             "a repeater or converter that gives back what it hears, a station that sends twice, or two stations with "
             "one address that hold the same",
             "switch the station off and see whether something still answers; then the repeater",
+            explains=("N2011", "LN204"),
         ),
         Rule(
             "N2014",

@@ -10,10 +10,12 @@
    than any master repeats, and were answered then (`relay.py`). Within GIVE_UP of the unanswered try, with no other
    command between, they are a retry.
 5. A second good answer without a command between: late where a command a short while ago is owed one of that form (of
-   the two answers either may be the late one), or was damaged or had a damaged answer, else answered twice. Whether
-   that means two stations is for the rules to say: the same octets again may be a repeater's. Where there is room for
-   a command that was missed at this tap, it answers that one, unasked, unless a try of the command answered before it
-   is owed one; a station that has answered four later commands owes nothing any more.
+   the two answers either may be the late one), or was damaged or had a damaged answer, else answered twice. A short
+   while: some times as long as the master waited for it. Of a station that says things twice, the same octets at once
+   are no other station's late answer. Whether that means two stations is for the rules to say: the same octets again
+   may be a repeater's. Where there is room for a command that was missed at this tap, it answers that one, unasked,
+   unless a try of the command answered before it is owed one; a station that has answered four later commands owes
+   nothing any more.
 6. How long a master waits is its own setting (NAE 250 ms to 3 s), so silence alone closes a command after GIVE_UP.
 7. A damaged command is for the station that it names where that one is known; else for the one known station whose
    address makes its checksum right, and is most like what was sent.
@@ -21,44 +23,30 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from dissectors.frame import Event, Frame, Header, Noise, Reason, Role
-from dissectors.line import NS_PER_S, Timing
+from dissectors.line import Timing
 from dissectors.n2.commands import parse_command
-from dissectors.n2.exchange import Exchange, best_owed, closed_exchange
+from dissectors.n2.exchange import GIVE_UP, Exchange, best_owed, closed_exchange
 from dissectors.n2.forms import may_answer
 from dissectors.n2.header import BROADCAST, meant
 from dissectors.n2.known import KnownStations
 from dissectors.n2.relay import Relay
+from dissectors.n2.station_times import FEW, StationTimes
 from dissectors.n2.stretch import STRAY
 from dissectors.tracker import Interval, Placement, Tracked, Transaction, Verdict
 
 Row = tuple[int, Frame, Header]
 """Number, frame and header."""
 
-GIVE_UP = 3 * NS_PER_S
-"""Longest time that a master waits for an answer, ns (upper end of the NAE's setting; digimat.n2's default)."""
-
+ACKNOWLEDGED = b"A\r"  # which answers most commands alike
 _LONGEST = 256  # characters of an answer that may have begun in time and not be read yet
 _SHORTEST = 7  # characters of a command
 _OWING = 16  # commands remembered that a late answer may still answer
-FEW = 16
-"""Answers of a station after which its shortest time says something."""
-
-
-@dataclass(slots=True)
-class _Times:
-    """How soon a station answers: how often that was seen, and the shortest that it may have been, ns."""
-
-    count: int = 0
-    least: int = 0
-
-    def add(self, latency: Interval) -> None:
-        self.least = min(self.least, latency.low) if self.count else latency.low
-        self.count += 1
+_DOUBLES = 2  # answers given twice by a station that make it its habit
 
 
 class N2Tracker:
@@ -74,7 +62,8 @@ class N2Tracker:
         self._owing: deque[Exchange] = deque(maxlen=_OWING)  # commands without a good answer, oldest first
         self._done: Exchange | None = None  # the last command, when it was closed by an answer
         self._known = KnownStations()
-        self._times: dict[int, _Times] = {}  # by station
+        self._times: dict[int, StationTimes] = {}  # by station
+        self._doubles: Counter[int | None] = Counter()  # answers given twice, octet for octet, by station
         self._pause: int | None = None  # ns, the shortest between an answer and the next command
         self._relay = Relay(max(timing.t35, 2 * timing.char + timing.latency))
 
@@ -143,7 +132,7 @@ class N2Tracker:
         self._relay.forget()
         for station, (number, least) in times.items():
             self._known.add(station)
-            self._times[station] = _Times(number, least)
+            self._times[station] = StationTimes(number, least)
         self._next += count
         no, frame, header = asked
         self._done = Exchange(
@@ -173,6 +162,7 @@ class N2Tracker:
                 return self._echo(no, frame, header.role, open_, closed)
         self._see_pause(frame.start)
         if open_ is not None:
+            open_.waited = frame.start - open_.end
             closed.append(self._close_unanswered(open_))
         station = header.destination if header.ok or frame.repair is not None else self._station_of(octets, header)
         if station is not None and header.ok:
@@ -263,7 +253,7 @@ class N2Tracker:
         if header.kind == "negative-acknowledge":
             verdict = Verdict.EXCEPTION
         if open_.station is not None and open_.station in self._known and not perhaps_late:
-            self._times.setdefault(open_.station, _Times()).add(latency)
+            self._times.setdefault(open_.station, StationTimes()).add(latency)
         done = closed_exchange(open_, verdict, error=header.error)
         closed.append(replace(done, response=no, end=frame.end, latency=latency))
         return Placement(no, open_.id, Role.RESPONSE, open_.station, None)
@@ -287,7 +277,7 @@ class N2Tracker:
         return [
             exchange
             for exchange in self._owing
-            if now - exchange.end <= 2 * GIVE_UP and self._answers_of(exchange) - exchange.known_answers <= 3
+            if now - exchange.end <= exchange.owed_for and self._answers_of(exchange) - exchange.known_answers <= 3
         ]
 
     def _answers_of(self, exchange: Exchange) -> int:
@@ -302,6 +292,12 @@ class N2Tracker:
         soonest = 0 if done.station is None else self.known_times(done.station)[1]
         return frame.start - done.answer_end >= room + soonest // 2
 
+    def _says_again(self, done: Exchange, frame: Frame) -> bool:
+        """Whether an answer says what the one before it said, sooner than a command surely fits between."""
+        room = (self._pause or 0) + self._latency + _SHORTEST * self._char
+        says_much = frame.octets != ACKNOWLEDGED or self._doubles[done.station] >= _DOUBLES
+        return says_much and frame.octets == done.answer and frame.start - done.answer_end < room
+
     def _forget(self, exchange: Exchange) -> None:
         if self._missed is exchange:
             self._missed = None
@@ -313,7 +309,8 @@ class N2Tracker:
         if not header.ok:
             station = done.station if done is not None else missed.station if missed is not None else None
             return self._separate(no, frame, header, Verdict.UNSOLICITED, None, closed, station)
-        if done is not None and self._has_room(done, frame):
+        again = done is not None and self._says_again(done, frame)
+        if done is not None and not again and self._has_room(done, frame):
             tries = [one for one in self._within(frame.start) if one.first_try == done.first_try]
             owing = best_owed(tries, frame)  # each try of one command has its answer
             if owing is None:
@@ -321,7 +318,7 @@ class N2Tracker:
             self._forget(owing)
             return self._separate(no, frame, header, Verdict.LATE, owing, closed)
         if done is not None:
-            owed = self._within(frame.start)
+            owed = [] if again and self._doubles[done.station] >= _DOUBLES else self._within(frame.start)
             same = [exchange for exchange in owed if exchange.station == done.station]
             owing = best_owed(same, frame) or best_owed(owed, frame) or self._crossed(owed, done, frame)
             owing = owing or next((exchange for exchange in owed if not exchange.is_owed), None)
@@ -331,6 +328,7 @@ class N2Tracker:
             if frame.octets == done.answer and frame.start - done.answer_end <= self._at_once:
                 return self._echo(no, frame, Role.RESPONSE, done, closed)
             if frame.start - done.end <= GIVE_UP and may_answer(parse_command(done.octets), frame.octets):
+                self._doubles[done.station] += again
                 return self._separate(no, frame, header, Verdict.ANSWERED_TWICE, done, closed)
         elif missed is not None and frame.start - missed.end <= 2 * GIVE_UP:
             self._forget(missed)
