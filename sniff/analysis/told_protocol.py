@@ -139,8 +139,9 @@ def _how_sure(best: Candidature, readings: Sequence[Candidature], second: tuple[
 
 
 def _second(session: Session, best: Candidature, others: Sequence[str]) -> tuple[str, int] | None:
-    """Another protocol that makes good frames of what the best one calls noise."""
-    if best.covered >= 1.0 or not others:
+    """Another protocol of lines that makes good frames of what the best one, of lines too, calls noise."""
+    others = [name for name in others if registry.is_of_lines(name)]  # a relative on networks shares no line
+    if best.covered >= 1.0 or not others or not registry.is_of_lines(best.protocol):
         return None
     rest = noise_of(session, best.protocol, best.line)
     return second_in(rest, replace(session, line=best.line), others)

@@ -44,7 +44,8 @@ class SecondProof:
     of the first row that may be one of its frames."""
 
     def __init__(self, session: Session) -> None:
-        self.name = session.notes.get(SECOND_NOTE, "")
+        told = session.notes.get(SECOND_NOTE, "")
+        self.name = told if registry.is_of_lines(told) else ""  # what a file says may be anything
         self.since = 0
         self._session = session
         known = not session.unknown and registry.is_of_lines(session.protocol)  # a relative on networks has streams

@@ -88,6 +88,15 @@ def test_the_second_protocol_is_named() -> None:
     assert "foreign frames that read as" in told.words
 
 
+def test_a_relative_on_networks_is_no_second_protocol_of_a_line() -> None:
+    tcp = bytes.fromhex("0001 0000 0006 01 03 0000 0002"), bytes.fromhex("0001 0000 0007 01 03 04 00D7 001A")
+    noise = random.Random(1).randbytes(400)
+    told = told_by(session_of(*(*RTU * 4, noise, *tcp) * 2))
+    assert told.reading is not None
+    assert told.reading.protocol == "modbus-rtu"
+    assert told.second is None, "all rows were held back for it, and none was shown"
+
+
 @pytest.mark.parametrize(("char", "line"), [(1_041_667, "9600,8N1"), (572_917, "19200,8E1"), (86_806, "115200,8N1")])
 def test_exact_times_tell_the_line(char: int, line: str) -> None:
     exact = Adapter("logic analyser", latency_from="exact times")

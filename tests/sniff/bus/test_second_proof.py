@@ -10,7 +10,7 @@ import pytest
 from sniff.bus import second_proof
 from sniff.engine.blocks import Block
 from sniff.engine.bulk import tables
-from sniff.engine.session import LineEvent, Session
+from sniff.engine.session import SECOND_NOTE, LineEvent, Session
 from sniff.engine.table import Table
 from tests.bench import bulk_mstp
 
@@ -40,3 +40,9 @@ def test_a_damaged_capture_comes_as_it_is_read(monkeypatch: pytest.MonkeyPatch) 
         assert len(made) - len(given) <= 2, "rows of windows that were asked are still held"
     assert given == made
     assert all(isinstance(item, Table) and not item.good.all() for item in given[:BLOCKS])
+
+
+def test_a_relative_on_networks_is_no_second_protocol_of_a_line() -> None:
+    noted = replace(SESSION, notes={SECOND_NOTE: "modbus-tcp"})
+    assert second_proof.SecondProof(noted).name == "", "all rows were held back for it, and none was shown"
+    assert second_proof.SecondProof(replace(SESSION, notes={SECOND_NOTE: "n2"})).name == "n2"
