@@ -124,7 +124,9 @@ class Assembly:
             role = Role.SAME  # one line that was decoded as two
         self._annotated = line.samples, line.octets
         if line.spelling == "one octet" and not line.tool and not self._plan.octetwise and role is not Role.SAME:
-            role = role if not line.bare or self._plan.width or self._goes_on or self._held else Role.NOTHING
+            is_below = self._heading is not None and not self._used and not self._plan.labelled
+            is_more = bool(self._plan.width or self._goes_on or self._held)
+            role = role if not line.bare or is_more or is_below else Role.NOTHING
         if role is Role.SAME:
             self.was = Kind.SHAPE
             return

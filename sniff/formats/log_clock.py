@@ -13,8 +13,9 @@ from dissectors.quick_values import quickly_made
 from sniff.formats.log_times import AS_WRITTEN, BARE, EPOCH, Order, Times, day_of
 from sniff.formats.table_cells import MOST, UNITS, seconds
 
-_TIME = (
-    r"(?P<clock>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9}|:\d{3}(?![\d:]))?)(?!\d|:[0-9A-Za-z])(?: ?(?P<half>[AaPp][Mm])\b)?"
+_TIME = (  # behind the seconds octets may follow: ,01CB
+    r"(?P<clock>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9}(?!\d|[A-Fa-f](?![Mm]\b))|:\d{3}(?![\d:]))?)"
+    r"(?!\d|:[0-9A-Za-z])(?: ?(?P<half>[AaPp][Mm])\b)?"
 )
 _MONTHS = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
 _MONTH = r"(?P<month>Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec)[a-z]*"
@@ -106,6 +107,13 @@ def _dashed(match: re.Match[str], _order: Order | None) -> int:
     return (int(hours) * 60 + int(minutes)) * 60 * NS_PER_S + seconds(rest)
 
 
+def _packed(match: re.Match[str], _order: Order | None) -> int:
+    digits, _, parts = re.sub(r"[T_ -]", "", match["packed"]).replace(",", ".").partition(".")
+    year, month, day, hour, minute = (int(digits[:4]), *(int(digits[at : at + 2]) for at in (4, 6, 8, 10)))
+    of_day = (hour * 60 + minute) * 60 * NS_PER_S + seconds(f"{digits[12:]}.{parts or 0}")
+    return _midnight(year, month, day) + of_day
+
+
 def _named(match: re.Match[str], _order: Order | None) -> int:
     return int(Decimal(match["number"]) * _unit(match))
 
@@ -144,6 +152,10 @@ CLOCKS: tuple[Clock, ...] = (
     Clock("time of day", _clock(_TIME), _of_day, daily=True),
     Clock("time of day behind a label", re.compile(
               r"(?<=[G-Zg-z]:)(?P<clock>\d{1,2}:\d{2}:\d{2}[.,]\d{3,6})(?!\d)"), _of_day, daily=True),
+    Clock("date and time without signs", _clock(
+              r"(?P<packed>(?:19|20)\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])[T_ -]?"
+              r"(?:[01]\d|2[0-3])[0-5]\d[0-5]\d(?:[.,]\d{1,9})?)(?P<zone>Z?)(?![0-9A-Za-z])"), _packed,
+          dated=True, first=True),
     Clock("TAI64N", _clock(r"@(?P<tai>4[0-9a-f]{15})(?P<nano>[0-3][0-9a-f]{7})(?![0-9a-f])"), _tai, dated=True,
           first=True),
     Clock("ms since the epoch", _clock(r"(?P<number>1\d{12})(?=[\s:;,\])|])"), _scaled(MS), dated=True, first=True),
@@ -235,7 +247,7 @@ def _tick(match: re.Match[str], counted: int = 0) -> int:
         return max(1, counted // int(10 ** len(match["number"].partition(".")[2])))
     if "nano" in found:
         return 1
-    text = found.get("clock") or found.get("dashed") or found.get("number") or ""
+    text = found.get("clock") or found.get("dashed") or found.get("packed") or found.get("number") or ""
     unit = NS_PER_S
     if "unit_behind" in found:
         unit = _unit(match)

@@ -109,7 +109,7 @@ def _taken_apart(text: str, base: int, rows: bool, times: Times, least: int) -> 
         return EMPTY
     if text.lstrip().startswith(REMARK) and not _NUMBERED.match(text):
         return REMARKED
-    stamp, text = _without_stamps(text, times)
+    stamp, text = without_stamps(text, times)
     known = shape_of(text)
     if rows and (known is None or known[0].role is not Role.DATA or "octets" not in known[1].re.groupindex):
         row = _row(text, stamp)
@@ -133,7 +133,7 @@ def _taken_apart(text: str, base: int, rows: bool, times: Times, least: int) -> 
     begin, end = groups.get("begin"), groups.get("end")
     samples = (int(begin[:18]), int(end[:18])) if begin and end else None
     if not way and told is None:
-        way = _way(text[: run.begin])
+        way = way_of(text[: run.begin])
     is_cut = bool(groups.get("cut")) or int(groups.get("count") or 0) > len(run.octets)
     return Line(
         Kind.OCTETS, stamp, way, run.octets, shape.tool, False, Role.DATA, shape.tool, run.spelling,
@@ -150,13 +150,13 @@ def numbers_of(text: str) -> tuple[str, ...]:
     text = SPACES.sub("   ", COLOURS.sub("", text))[:LONGEST].rstrip()
     if text.lstrip().startswith(REMARK) and not _NUMBERED.match(text):
         return ()
-    text = _without_stamps(text)[1]
+    text = without_stamps(text)[1]
     return numbers_in(text) or ((alone,) if (alone := number_in(text)) else ())
 
 
 def head_of(text: str) -> str:
     """What a line says that stands above octets, without times and numbers: the same for all heads of one sort."""
-    text = _without_stamps(COLOURS.sub("", text)[:LONGEST])[1].replace(STAMP, "")
+    text = without_stamps(COLOURS.sub("", text)[:LONGEST])[1].replace(STAMP, "")
     return " ".join(_NUMERAL.sub("#", text).split())[:80]
 
 
@@ -169,12 +169,12 @@ def _general(text: str, stamp: Stamp | None, base: int, least: int) -> Line:
         run = whole_in(text, run)
     if run is None:
         kind = Kind.STRANGE if _looks(text) else Kind.TEXT
-        return Line(kind, stamp, _way(text) if kind is Kind.TEXT else "")
+        return Line(kind, stamp, way_of(text) if kind is Kind.TEXT else "")
     lead = text[: run.begin]
     if run.broken:
         lead = _LOST.sub("", lead)
-    way = _way(lead)
-    label = " ".join(_DIGITS.sub("#", WAYS.sub("~", lead)).replace(STAMP, "").split())
+    way = way_of(lead)
+    label = label_of(lead)
     bare = not _WORDS.search(label) and "~" not in label and "#" not in label and STAMP not in lead
     goes_on = text.rstrip().endswith((",", "\\"))
     return Line(
@@ -222,7 +222,12 @@ def _beside(rest: str, run: Run, base: int) -> list[tuple[str, bytes]]:
 _COLUMN_BESIDE = re.compile(r"[ \t]*[|;]?[ \t]+(?=[0-9A-Fa-f(\[<{])")
 
 
-def _way(lead: str) -> str:
+def label_of(lead: str) -> str:
+    """What stands before octets, without times; the same for all lines of one sort."""
+    return " ".join(_DIGITS.sub("#", WAYS.sub("~", lead)).replace(STAMP, "").split())
+
+
+def way_of(lead: str) -> str:
     """The direction that a label tells: of several the last, which stands nearest to the octets; "A >> B" whole."""
     found = list(WAYS.finditer(lead))
     if not found:
@@ -240,7 +245,7 @@ def _looks(text: str) -> bool:
     """Whether a line that tells no octets looks as if it did, or is no words either."""
     found = len(_HEXLIKE.findall(text))
     if found >= max(3, len(_WORDS.findall(text))) or (
-        found > 0 and not _WORDS.search(text) and (STAMP not in text or bool(_way(text)))
+        found > 0 and not _WORDS.search(text) and (STAMP not in text or bool(way_of(text)))
     ):
         return True
     joined = _JOINED.search(text)  # digits without space, of which a few are none
@@ -251,7 +256,8 @@ _HEX = frozenset("0123456789ABCDEFabcdef")
 _JOINED = re.compile(r"(?:^|[\s:>=\]])(?=[0-9A-Za-z?]*[0-9A-Fa-f]{4})(?=(?:[A-Za-z?]*\d){4})([0-9A-Za-z?]{10,})\s*$")
 
 
-def _without_stamps(text: str, times: Times = AS_WRITTEN) -> tuple[Stamp | None, str]:
+def without_stamps(text: str, times: Times = AS_WRITTEN) -> tuple[Stamp | None, str]:
+    """The first time of a line, None without one; and the line with STAMP where times were."""
     first: Stamp | None = None
     for _ in range(MOST_STAMPS):
         stamp = stamp_of(text, times)
@@ -274,7 +280,7 @@ def _row(text: str, stamp: Stamp | None) -> Line | None:
     if octets is None:
         return None
     return Line(
-        Kind.ROW, stamp, _way(lead), octets, " ".join(_DIGITS.sub("#", WAYS.sub("~", lead)).split()),
+        Kind.ROW, stamp, way_of(lead), octets, " ".join(_DIGITS.sub("#", WAYS.sub("~", lead)).split()),
         not lead.strip(), offset=match["offset"],
     )  # fmt: skip
 

@@ -55,7 +55,7 @@ def octets_in(line: str, base: int = PAIRS_ONLY, least: int = 0) -> Run | None:
                 octets = spelling.decode(match[0])
             except (ValueError, SyntaxError):
                 continue
-            if octets:
+            if octets and not _are_told_ahead(line[: match.start()], octets, base):
                 broken = is_broken(line, match.start(), match.end())
                 return Run(match.start(), match.end(), octets, spelling.name, broken)
     run = _digits(line, base)
@@ -68,6 +68,16 @@ def octets_in(line: str, base: int = PAIRS_ONLY, least: int = 0) -> Run | None:
     text = line[run.begin : run.end]
     wordy = not any(sign.isdigit() for sign in text) and len(set(run.octets)) > 1
     return replace(run, wordy=True) if wordy else run
+
+
+def _are_told_ahead(lead: str, octets: bytes, base: int) -> bool:
+    """Whether what stands before says these octets in numbers: then they are its column of characters, which has not
+    all that a row says."""
+    body = octets.rstrip(b"\r\n")
+    if len(lead) < 3 * len(body) - 1:
+        return False
+    run = _digits(lead, base)
+    return run is not None and body in run.octets
 
 
 def whole_in(line: str, run: Run) -> Run:

@@ -17,7 +17,9 @@ from dissectors.line import MS
 from sniff.formats.dump_rows import SAME_ROWS
 from sniff.formats.log_lines import Kind, Line, head_of, line_of, numbers_of
 from sniff.formats.log_margin import NO_MARGIN, Margin, margin_of
+from sniff.formats.log_numbers import base_of
 from sniff.formats.log_octets import PAIRS_ONLY
+from sniff.formats.log_outline import Outline, outlines_of, short_line
 from sniff.formats.log_rewriting import are_codes, as_codes, with_escapes
 from sniff.formats.log_shapes import Role
 from sniff.formats.log_times import AS_WRITTEN, FASTEST, Times, counted, number_ahead, order_of
@@ -78,12 +80,15 @@ class Plan:
     growing: frozenset[str] = frozenset()
     with_status: bool = False
     in_codes: bool = False
+    outlines: frozenset[Outline] = frozenset()
 
     def line(self, text: str) -> Line:
         """A line taken apart as this log writes it."""
         text = self.margin.without(text)
         text = as_codes(text) if self.in_codes else text
         line = line_of(text, self.base, self.offsets is not None, self.times)
+        if self.outlines and self._may_be_short(line):
+            line = short_line(text, self.base, self.times, self.outlines) or line
         if self.with_status and _is_of_adapter(line):
             line = replace(line, octets=line.octets[STATUS:], kind=line.kind if line.octets[STATUS:] else Kind.SHAPE)
         is_other = line.kind in (Kind.TEXT, Kind.STRANGE) or line.spelling == "one octet"
@@ -96,6 +101,12 @@ class Plan:
             if string.bare or self.roles.get(string.family) is Role.DATA:
                 return string
         return line
+
+    def _may_be_short(self, line: Line) -> bool:
+        """Whether a line has no octets of its own, or one, of which its label says nothing."""
+        if line.kind is Kind.OCTETS:
+            return line.spelling == "one octet" and not line.tool and self.roles.get(line.family) is not Role.DATA
+        return line.kind in (Kind.TEXT, Kind.STRANGE) or line.role is Role.HEADING
 
     def role(self, line: Line, recent: bytes) -> Role | None:
         """What a line with octets is; None: nobody knows. `recent`: the octets told last."""
@@ -125,7 +136,7 @@ def plan_of(texts: Sequence[str]) -> Plan | None:
 
 
 def _plan(texts: Sequence[str]) -> Plan | None:
-    base = _base([numbers_of(text) for text in texts if text.strip()])
+    base = base_of([numbers_of(text) for text in texts if text.strip()])
     times = order_of(texts)
     lines = [line_of(text, base, times=times) for text in texts]
     offsets = _offsets(
@@ -145,6 +156,11 @@ def _plan(texts: Sequence[str]) -> Plan | None:
     if times.clocks_only:
         lines = [line_of(text, base, False, times) for text in texts]
     plan = _of_labels([line for line in lines if line.kind is not Kind.EMPTY], base)
+    if plan is not None:
+        told = (
+            text for text, line in zip(texts, lines, strict=True) if plan.role(line, b"") is Role.DATA and line.octets
+        )
+        plan = replace(plan, outlines=outlines_of(told, base, times))
     with_status = begin_with_status([line.octets for line in lines if _is_of_adapter(line)])
     return replace(plan, times=times, with_status=with_status) if plan is not None else None
 
@@ -323,30 +339,6 @@ def _are_at_once(before: Line, line: Line) -> bool:
     if told is None or stamp is None or stamp.tick > MS:
         return False
     return abs(stamp.time - told.time) < FASTEST * len(line.octets)
-
-
-def _base(numbers: Sequence[Sequence[str]]) -> int:
-    """How numbers are written: in pairs of hexadecimal digits in most lines, or in as many digits as they have; then
-    in decimal where one has three of them, or none is a letter.
-    """
-    alone = [tokens[0] for tokens in numbers if len(tokens) == 1]
-    runs = [tokens for tokens in numbers if len(tokens) > 1]
-    if len(alone) > _MOSTLY * len(numbers) and not runs:  # an octet a line
-        runs = [alone]
-    mixed = [tokens for tokens in runs if len(tokens) > 3 and _is_unpadded(tokens)]
-    if 2 * len(mixed) <= len(runs):
-        return PAIRS_ONLY
-    tokens = [token for run in mixed for token in run]
-    if any(len(token) == 3 for token in tokens):
-        return 10
-    return 16 if any(not token.isdigit() for token in tokens) else 10
-
-
-def _is_unpadded(tokens: Sequence[str]) -> bool:
-    """Whether numbers have as many digits as they need, or three each: then one digit is no half of a pair."""
-    if all(len(token) == 3 for token in tokens):
-        return True
-    return any(len(token) != 2 for token in tokens) and not any(len(token) > 1 and token[0] == "0" for token in tokens)
 
 
 def _offsets(rows: Sequence[tuple[Line, str]]) -> int | None:

@@ -24,10 +24,10 @@ def are_codes(texts: Iterable[str]) -> bool:
         return False
     if any(len(token) != 2 for run in runs if len(run) > 3 for token in run):
         return True
-    return 2 * sum(_is_of_characters(bytes(map(int, run))) for run in runs) > len(runs)
+    return 2 * sum(is_of_characters(bytes(map(int, run))) for run in runs) > len(runs)
 
 
-def _is_of_characters(octets: bytes) -> bool:
+def is_of_characters(octets: bytes) -> bool:
     """Whether octets are a sign, characters and CR or LF, as frames of text are."""
     return octets[:1] in (b":", b">") and octets[-1:] in (b"\r", b"\n") and octets.rstrip(b"\r\n").isascii()
 

@@ -22,69 +22,25 @@ from decimal import Decimal, InvalidOperation
 from itertools import pairwise
 
 from dissectors.frame import Chunk, LineError, Mark
+from sniff.formats.column_names import (
+    ANALYSER,
+    ANY_ERROR,
+    BEGIN,
+    DAYS,
+    DURATION,
+    END,
+    ERRORS,
+    OCTET,
+    PAIRS,
+    TIME_WORDS,
+    TYPE,
+    TYPES_WITH_OCTETS,
+    named,
+)
 from sniff.formats.log_calendar import calendar_of
 from sniff.formats.log_times import AS_WRITTEN, UNIT_NAMES, Times, is_count, order_of, unit_of
 from sniff.formats.table_cells import DIGITS, MOST, UNITS, fits, octets_of, spelling_of, tick_of, time_of
 
-OCTET = (
-    "octet",
-    "octets",
-    "byte",
-    "bytes",
-    "data",
-    "value",
-    "hex",
-    "payload",
-    "data (hex)",
-    "hex data",
-    "raw",
-    "message",
-    "decoded protocol result",
-    "decoded result",
-    "telegram",
-    "data(hex)",
-    "data hex",
-    "rx data",
-    "tx data",
-    "rx",
-    "tx",
-)
-PAIRS = (
-    ("rx", "tx"),
-    ("rx data", "tx data"),
-    ("request", "response"),
-    ("query", "response"),
-    ("query", "answer"),
-    ("sent", "received"),
-    ("send", "receive"),
-    ("anfrage", "antwort"),
-    ("запрос", "ответ"),
-)
-"""Two columns that hold octets, one or both in a row."""
-DAYS = ("date", "datum", "дата", "fecha", "data")
-"""The day, where the time of day stands in another column."""
-ANALYSER = re.compile(r".*\b(?:uart|rs-?485|rs-?232|async serial|serial)\b.*")
-"""A column that is named for its decoder, when no other holds octets."""
-BEGIN = ("t_start_s", "start", "start_s", "begin", "start_time", "start time")
-END = ("t_end_s", "end", "end_s", "time", "time_s", "timestamp", "t", "date", "datetime", "date/time", "date time")
-DURATION = ("duration", "duration_s")
-ERRORS = {"parity error": LineError.PARITY, "framing error": LineError.FRAMING}
-ANY_ERROR = "error"
-TYPE = "type"
-TYPES_WITH_OCTETS = ("", "data", "result", "rx", "tx", "read", "write", "irp_mj_read", "irp_mj_write")
-
-TIME_WORDS = re.compile(
-    r"(?:ts|t|time|timestamp|when|zeit|zeitstempel|uhrzeit|datum|date|время|дата|temps|hora|heure|clock|epoch|uptime|"
-    r"elapsed|millis)"
-)
-"""Words of which a time is named."""
-
-_UNIT = re.compile(
-    r"(?P<name>[^\[(]*)[\[(](?P<unit>s|ms|us|µs|μs|ns)[\])]"
-    r"|(?P<stem>.+?)[_ ,/-]+(?:in[_ ])?"
-    r"(?P<last>s|secs?|seconds|ms|millis(?:econds)?|us|µs|μs|micros(?:econds)?|ns|nanos)"
-)
-_LONG = {"sec": "s", "millis": "ms", "micros": "us", "nanos": "ns"}
 _DELIMITERS = (",", ";", "\t", "|")
 
 BETWEEN = 10_000_000
@@ -114,8 +70,8 @@ class TableLayout:
     """Column → the error it tells; None: it names the error itself."""
     times: Times = AS_WRITTEN
     """How dates are read, and what was assumed."""
-    tail: bool = False
-    """Whether each cell from `octet` on holds one octet."""
+    behind: int = 0
+    """The column behind those that hold an octet each, of which `octet` is the first; 0 where one holds all."""
     other: int | None = None
     """Where octets stand of the other direction, instead or too."""
     day: int | None = None
@@ -157,8 +113,8 @@ class TableLayout:
             yield Chunk(first.time + BETWEEN + len(octets) * char, octets)
 
     def _chunk(self, row: Sequence[str], char: int) -> Chunk:
-        if self.tail:
-            octets = b"".join(self.read(cell) for cell in row[self.octet :] if cell.strip())
+        if self.behind:
+            octets = b"".join(self.read(cell) for cell in row[self.octet : self.behind] if cell.strip())
         else:
             cell = _cell(row, self.octet)
             octets = self.read(cell if cell.strip() or self.other is None else _cell(row, self.other))
@@ -205,7 +161,7 @@ def heading_of(heading: str, delimiter: str, rows: Sequence[str]) -> TableLayout
     if len(heading) > LONGEST_HEADING:
         return None
     written = [name.strip().strip('"').strip().lower() for name in heading.split(delimiter)]
-    names, units = zip(*(_named(name) for name in written), strict=True)
+    names, units = zip(*(named(name) for name in written), strict=True)
 
     def place(known: Iterable[str]) -> int | None:
         found = (
@@ -219,11 +175,13 @@ def heading_of(heading: str, delimiter: str, rows: Sequence[str]) -> TableLayout
     begin, end = place(BEGIN), place(END)
     if "time [s]" in written:  # of Saleae Logic
         begin, end = written.index("time [s]"), None
-    octet = place(OCTET)
+    octet, behind = _named_octets(written, names, cells), 0
     if octet is None:
         octet = next((number for number, name in enumerate(names) if ANALYSER.fullmatch(name)), None)
     if begin is None and end is None:
-        end = next((number for number, name in enumerate(names) if TIME_WORDS.fullmatch(name)), None)
+        end = _named_times(names, cells, octet)
+    if octet is None:
+        octet, behind = _numbered(names, cells)
     if _is_heading(written, cells):
         octet = octet if octet is not None else _column(cells, len(written), _are_octets)
         if begin is None and end is None:
@@ -246,7 +204,7 @@ def heading_of(heading: str, delimiter: str, rows: Sequence[str]) -> TableLayout
     if octet is None or when is None or octet == when or len(names) < 2:
         return None
     errors = [(names.index(name), error) for name, error in ERRORS.items() if name in names]
-    named = [(names.index(ANY_ERROR), None)] if ANY_ERROR in names else []
+    telling = [(names.index(ANY_ERROR), None)] if ANY_ERROR in names else []
     kind = names.index(TYPE) if TYPE in names else None
     data = [
         cell
@@ -254,19 +212,43 @@ def heading_of(heading: str, delimiter: str, rows: Sequence[str]) -> TableLayout
         if max(octet, when) < len(cell)
         and (kind is None or kind >= len(cell) or cell[kind].lower() in TYPES_WITH_OCTETS)
     ]
-    tail = octet > when and _go_on(names, octet, data)
+    if not behind and octet > when and _go_on(names, octet, data):
+        behind = LONGEST_HEADING
     partners = [two for pair in PAIRS for one, two in (pair, pair[::-1]) if names[octet] == one and two in names]
     other = names.index(partners[0]) if partners else None
-    told = [[one for one in cell[octet:] if one] if tail else [_either(cell, octet, other)] for cell in data]
+    told = [[one for one in cell[octet:behind] if one] if behind else [_either(cell, octet, other)] for cell in data]
     read = spelling_of([one for cell in told for one in cell])
     lengths = [_length(cell, read) for cell in told]
     unit, times = _times_of([cell[when] for cell in data], lengths, units[when])
     ticks = [tick for cell in data if (tick := tick_of(cell[when], unit, times)) is not None]
     return TableLayout(
-        octet, read, delimiter, begin, end, place(DURATION), unit, kind, (*errors, *named), times, tail, other, day,
+        octet, read, delimiter, begin, end, place(DURATION), unit, kind, (*errors, *telling), times, behind, other, day,
         min(ticks) if len(ticks) >= FEW_TIMES else 1, 10 * lengths.count(1) >= 9 * len(lengths),
         *calendar_of([cell[when] for cell in data[:FEW_TIMES]], times),
     )  # fmt: skip
+
+
+def _named_octets(written: Sequence[str], names: Sequence[str], cells: Sequence[Sequence[str]]) -> int | None:
+    """The column that is named for octets; of several the first, unless another has many more: one may have their
+    number."""
+    known = [row.index(name) for name in OCTET for row in (written, names) if name in row]
+    if not known:
+        return None
+    many = {number: sum(_length([cell], octets_of) for cell in _of_column(cells, number)) for number in known}
+    most = max(known, key=lambda number: many[number])
+    return most if many[most] > 2 * many[known[0]] else known[0]
+
+
+def _named_times(names: Sequence[str], cells: Sequence[Sequence[str]], octet: int | None) -> int | None:
+    """The column that is named for times; of several the first that has more than days."""
+    known = [number for number, name in enumerate(names) if TIME_WORDS.fullmatch(name) and number != octet]
+    with_times = (number for number in known if not all(map(_DAY.fullmatch, _of_column(cells, number))))
+    return next(with_times, known[0] if known else None)
+
+
+def _of_column(cells: Sequence[Sequence[str]], number: int) -> list[str]:
+    """What stands in a column."""
+    return [row[number] for row in cells if number < len(row) and row[number]]
 
 
 def _either(row: Sequence[str], octet: int, other: int | None) -> str:
@@ -284,6 +266,7 @@ def _are_of_days(cells: Sequence[Sequence[str]], day: int, when: int) -> bool:
 
 
 _NUMBERED_NAME = re.compile(r"(?:[a-z]{1,6}[ _#]?)?\[?[0-9a-f]{1,3}\]?|")
+_COUNTED = re.compile(r"([a-z]{1,8})[ _#]?\[?(\d{1,3})\]?")
 _ONE_OCTET = re.compile(r"(?:0x)?[0-9a-f]{1,2}h?|[0-9]{1,3}|", re.IGNORECASE)
 
 
@@ -297,21 +280,25 @@ def _go_on(names: Sequence[str], octet: int, rows: Sequence[Sequence[str]]) -> b
     return 2 * len(more) > len(rows) and all(_ONE_OCTET.fullmatch(cell) for row in more for cell in row[octet:])
 
 
-def _named(name: str) -> tuple[str, str]:
-    """The name of a column without its unit, and the unit, "" where it has none."""
-    match = _UNIT.fullmatch(name)
-    if name in ("ms", "us", "µs", "μs", "ns"):
-        return "time", name
-    if match is None:
-        return name, ""
-    if match["unit"] is not None:
-        return match["name"].strip(), match["unit"]
-    return match["stem"].strip(), _short(match["last"])
+def _numbered(names: Sequence[str], cells: Sequence[Sequence[str]]) -> tuple[int | None, int]:
+    """The columns data0, data1 … with an octet in each: the first and the one behind the last; None, 0 without."""
+    found = [_COUNTED.fullmatch(name) for name in names]
+    begin, many = 0, 0
+    for place, (before, match) in enumerate(pairwise((None, *found))):
+        goes_on = before and match and before[1] == match[1] and int(match[2]) == int(before[2]) + 1
+        begin, many = (begin, many + 1) if goes_on else (place, 1)
+        is_last = place + 1 == len(found)
+        behind = LONGEST_HEADING if is_last else place + 1  # a row may go on behind the names
+        ends = is_last or not found[place + 1]
+        if ends and many > 1 and _are_octets_each([row[begin:behind] for row in cells]):
+            return begin, behind
+    return None, 0
 
 
-def _short(unit: str) -> str:
-    """ "ms" of "milliseconds"."""
-    return next((short for start, short in _LONG.items() if unit.startswith(start)), unit)
+def _are_octets_each(cells: Sequence[Sequence[str]]) -> bool:
+    """Whether each cell holds an octet; levels of lines have one digit each."""
+    filled = [cell for row in cells for cell in row if cell]
+    return any(len(cell) > 1 for cell in filled) and all(_ONE_OCTET.fullmatch(cell) for cell in filled)
 
 
 def _is_heading(names: Sequence[str], cells: Sequence[Sequence[str]]) -> bool:
@@ -332,7 +319,7 @@ def _is_name(text: str) -> bool:
 def _column(cells: Sequence[Sequence[str]], many: int, wanted: Callable[[Sequence[str]], bool]) -> int | None:
     """The first column whose cells are as wanted."""
     for number in range(many):
-        column = [row[number] for row in cells if number < len(row) and row[number]]
+        column = _of_column(cells, number)
         if len(column) >= 2 and wanted(column):
             return number
     return None
@@ -343,7 +330,7 @@ _FRACTION = re.compile(r"[+-]?\d+[.,]\d+")
 
 def _are_octets(column: Sequence[str]) -> bool:
     """Whether cells are runs of octets: more than one in most. Two groups and a dot in each are a number."""
-    if all(_FRACTION.fullmatch(cell) for cell in column[:200]):
+    if all(_FRACTION.fullmatch(cell) or _DAY.fullmatch(cell) for cell in column[:200]):
         return False
     found = 0
     for cell in column[:200]:
