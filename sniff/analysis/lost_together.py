@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from dissectors.findings import Finding, Severity, Tally, counted
 from dissectors.line import NS_PER_S
 from dissectors.tracker import PASSING, Transaction, Verdict
+from dissectors.words import duration
 from sniff.analysis.line_rules import LINE_RULES as RULES
 
 if TYPE_CHECKING:
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
 LOST_IN_A_ROW = 3
 ANSWERED_BEFORE = 5
 MOST_STATIONS = 300
+MOMENT = 30 * NS_PER_S
+"""From the first of their last answers to the last of the first misses; over longer, a hole, nobody saw what stopped
+when."""
+
 BY_CHANCE = 0.1
 """Chance below which losses in one part of a capture are no chance: each falls anywhere in it."""
 
@@ -136,8 +141,10 @@ class LostTogether:
             tally.add(moment, *self._stations[number].rows[:2])
         others = [one for number, one in self._stations.items() if number not in names and one.last_answer > moment]
         who = "all of them" if not others else f"{counted(len(others), 'other station')} went on"
+        window = max(loss[1] for loss in together) - min(loss[0] for loss in together)
+        when = "at the same moment" if window < MOMENT else f"within {duration(window)}"
         seen = (
-            f"{len(names)} stations ({', '.join(map(str, names))}) stopped answering at the same moment, "
+            f"{len(names)} stations ({', '.join(map(str, names))}) stopped answering {when}, "
             f"{(moment - first) / NS_PER_S:.1f} s after the begin: {who}"
         )
         back = [loss[2] for loss in together if loss[2]]

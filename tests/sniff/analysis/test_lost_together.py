@@ -52,3 +52,12 @@ def test_what_is_lost_lasts_until_all_of_them_are_back() -> None:
         together.settle(asked(station, 60 + station / 10, answered=True))
         (finding,) = together.findings(0, 61 * S)
         assert finding.lasts is (station == 1)
+
+
+def test_what_was_lost_while_nobody_heard_is_not_of_one_moment() -> None:
+    together = LostTogether()
+    for second in [*range(30), *range(150, 3000)]:
+        for station in (1, 2, 3):
+            together.settle(asked(station, second + station / 10, second < 30))
+    (finding,) = together.findings(0, 3000 * S)
+    assert finding.seen.startswith("3 stations (1, 2, 3) stopped answering within 121 s, ")
