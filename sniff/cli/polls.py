@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 
 from dissectors.line import MS
 from dissectors.profiles import Devices
@@ -53,10 +54,10 @@ def write(args: argparse.Namespace, polls: Polls, devices: Devices, session: Ses
     held = list(polls)
     begin = min((poll.first for poll in held if poll.first is not None), default=0)
     end = max((poll.last for poll in held if poll.last is not None), default=0)
-    clock = iso if args.style != "text" else _clock
+    clock = iso if args.style != "text" else _clock if iso(begin)[:10] == iso(end)[:10] else _day_and_clock
     turned = [told(changes(poll, begin, end, polls.holes), clock) if session.has_times else "" for poll in held]
     rows = [
-        _row(poll, asked(poll, devices), words, args.style == "text", session.has_times)
+        _row(poll, asked(poll, devices), words, args.style == "text", session.has_times, clock)
         for poll, words in zip(held, turned, strict=True)
     ]
     if args.style != "text":
@@ -71,10 +72,11 @@ def write(args: argparse.Namespace, polls: Polls, devices: Devices, session: Ses
         print(f"and {polls.dropped} requests more, of entries beyond the {len(held)} above")
 
 
-def _row(poll: Poll, asks: str, changed: str, brief: bool, has_times: bool) -> tuple[Cell, ...]:
+def _row(
+    poll: Poll, asks: str, changed: str, brief: bool, has_times: bool, clock: Callable[[int], str]
+) -> tuple[Cell, ...]:
     key = poll.key
     interval, jitter = (poll.interval, poll.jitter) if has_times else (None, None)
-    clock = _clock if brief else iso
     return (
         key.source,
         "all" if key.station is None else key.station,
@@ -103,3 +105,8 @@ def _ms(time: int, brief: bool) -> Cell:
 def _clock(time: int) -> str:
     """The time of day of a long capture's moment, UTC."""
     return iso(time)[11:19]
+
+
+def _day_and_clock(time: int) -> str:
+    """The same where a capture is of several days: "03-02 10:00:00"."""
+    return iso(time)[5:19].replace("T", " ")

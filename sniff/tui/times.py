@@ -52,6 +52,18 @@ def clock(time: int) -> str:
     return f"{_local(time):%H:%M:%S}.{time % NS_PER_S // MS:03d}"
 
 
+def day_and_clock(time: int, begin: int, end: int) -> str:
+    """The same with its day where what is shown, from `begin` to `end` (ns), is of several: "03-02 10:00:00.123"."""
+    days = {_local(one).date() for one in (begin, end)}
+    return clock(time) if len(days) == 1 else f"{_local(time):%m-%d} {clock(time)}"
+
+
+def between(first: int, last: int) -> str:
+    """Two moments, or one: "10:00:00.123 … 10:02:03.456"."""
+    begin = day_and_clock(first, first, last)
+    return begin if first == last else f"{begin} … {day_and_clock(last, first, last)}"
+
+
 def date_and_clock(time: int) -> str:
     """Local date and time to the microsecond with the zone, "2026-03-01 10:00:00.123456 +0000"."""
     local = _local(time)

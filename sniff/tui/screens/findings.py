@@ -23,7 +23,7 @@ from sniff.tui.hanging import hanging
 from sniff.tui.screens.searching import SearchScreen
 from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
-from sniff.tui.times import clock
+from sniff.tui.times import between, clock
 
 EVIDENCE = 6
 """Frames that are named at least."""
@@ -191,9 +191,7 @@ class FindingsScreen(SearchScreen):
         if finding.cause is not None:
             text.append("from   ", style="dim").append(sanitized(" ".join(reversed(finding.cause))) + "\n")
         if self.store.session.has_times:
-            first, last = clock(finding.first), clock(finding.last)
-            span = first if finding.first == finding.last else f"{first} … {last}"
-            text.append("when   ", style="dim").append(f"{span}\n")
+            text.append("when   ", style="dim").append(f"{between(finding.first, finding.last)}\n")
         if finding.evidence:
             text.append("frames ", style="dim").append_text(self._frames(finding.evidence))
         text.rstrip()

@@ -21,7 +21,7 @@ from sniff.tui.screens.tabling import TableScreen
 from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable, count_cell
 from sniff.tui.timeline_picture import LABEL, ZOOMS, Chart, axis, draw_charts, fitting, seconds_in_words, widths
-from sniff.tui.times import clock, interval, jitter, latency
+from sniff.tui.times import between, clock, day_and_clock, interval, jitter, latency
 
 SHOWN = 500
 """Entries in the table at most."""
@@ -231,9 +231,10 @@ class PollsScreen(TableScreen):
         if not self.store.session.has_times:
             return sanitized(" · ".join(words))
         first, last = poll.first or 0, poll.last or 0
-        words.append(f"{clock(first)} … {clock(last)}" if first != last else clock(first))
+        words.append(between(first, last))
         begin, end = self._span()
-        turned = told(changes(poll, begin, end, self.store.polls.holes), lambda time: clock(time)[:8])
+        found = changes(poll, begin, end, self.store.polls.holes)
+        turned = told(found, lambda time: day_and_clock(time, begin, end).partition(".")[0])
         words += [turned] if turned else []
         chart = "" if self.size.height >= TALL else _chart(poll)
         return sanitized(" · ".join(words)) + (f"\nhow often  {chart}" if chart else "")

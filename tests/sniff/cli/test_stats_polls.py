@@ -56,3 +56,10 @@ def test_a_bus_that_asks_nothing(sniff485: Ran, tmp_path: Path) -> None:
     ran = sniff485("stats", empty, "polls")
     assert ran.code == 0, ran.err
     assert "was asked anything" in ran.out
+
+
+def test_times_of_several_days_have_their_day(sniff485: Ran, tmp_path: Path) -> None:
+    path = tmp_path / "days.cap.txt"
+    head = "#!sniff-capture 1\n# line: 19200,8E1\n# protocol: modbus-rtu\n# start: 2026-03-01T10:00:00Z\n"
+    path.write_text(head + "+43200000 01 03 00 00 00 02 C4 0B\n" * 3)
+    assert "03-01 21:59:59  03-02 21:59:59" in sniff485("stats", path, "polls").out

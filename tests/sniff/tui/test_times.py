@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sniff.tui.times import TimeMode, clock, date_and_clock, seconds, size
+from sniff.tui.times import TimeMode, between, clock, date_and_clock, seconds, size
 
 T = 1_772_359_200_000_000_000  # 2026-03-01T10:00:00Z
 
@@ -40,6 +40,13 @@ def test_size(octets: int, text: str) -> None:
 @given(st.integers(0, 10**15))
 def test_size_fits_the_header(octets: int) -> None:
     assert len(size(octets)) <= 8
+
+
+def test_moments_of_several_days_have_their_day() -> None:
+    begin = 1_772_359_200_123_000_000
+    assert between(begin, begin) == "10:00:00.123"
+    assert between(begin, begin + 3600 * 10**9) == "10:00:00.123 … 11:00:00.123"
+    assert between(begin, begin + 20 * 3600 * 10**9) == "03-01 10:00:00.123 … 03-02 06:00:00.123"
 
 
 def test_modes_go_round() -> None:
