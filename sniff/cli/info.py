@@ -97,6 +97,7 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary, fo
         "first": iso(first) if first is not None else None,
         "last": iso(last) if last is not None else None,
         "seconds": summary.seconds if session.has_times else None,
+        "unheard_seconds": summary.load.holes.total / NS_PER_S if session.has_times else None,
         "protocol": None if "protocol" in session.unknown else session.protocol,
         "line": None if "line" in session.unknown else str(session.line),
         "line_assumed": session.line_is_assumed,

@@ -46,3 +46,15 @@ def test_a_frame_over_the_boundary_counts_in_both_seconds(sniff485: Callable[...
 def test_how_much_of_a_row_was_heard_stands_beside_its_load(sniff485: Callable[..., Any], tmp_path: Path) -> None:
     _, *seconds = rows(sniff485, tmp_path, [900, *[100] * 12])
     assert [row["heard_s"] for row in seconds] == [pytest.approx(0.109, abs=1e-3), 1, pytest.approx(0.1, abs=1e-3)]
+
+
+def test_what_was_not_heard_is_said(sniff485: Callable[..., Any], tmp_path: Path) -> None:
+    path = tmp_path / "away.cap.txt"
+    poll = "+990 01 03 00 00 00 02 C4 0B\n+10 01 03 04 00 07 00 01 8A 32\n"
+    head = "#!sniff-capture 1\n# line: 19200,8E1\n# protocol: modbus-rtu\n# start: 2026-03-01T10:00:00Z\n"
+    away = "#! +1 unplugged x is gone (hung up)\n#! +600001 replugged x is back\n+600500 01 03 00 00 00 02 C4 0B\n"
+    path.write_text(head + 10 * poll + away + 10 * poll)
+    told = json.loads(sniff485("info", path, "--json").out)
+    assert told["unheard_seconds"] == 600
+    assert told["load"] == pytest.approx(348 * 11 / 19200 / (told["seconds"] - 600), rel=1e-4)
+    assert ", 10.0 min of it not heard)" in sniff485("info", path).out
