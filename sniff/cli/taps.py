@@ -55,13 +55,15 @@ def run(args: argparse.Namespace) -> int:
     doubt = sum(doubts)
     first, second = (ear.frames() for ear in ears)
     senders = traffic(first, second, matched(first, second, doubt, (ears[0].holes, ears[1].holes)))
-    found = faults(senders, doubt)
+    is_one_clock = len(args.words) != 2 or not Path(args.words[1]).exists()
+    found = faults(senders, doubt, is_one_clock)
     tables.write(words.HEADINGS if args.style == "text" else words.KEYS, words.rows(senders), args.style)
     if args.style == "json":
         for fault in found:
             print(json_output.dumps(words.as_value(fault)))
     if args.style == "text":
-        _say(found, bool(senders), any(one.both for one in senders.values()), doubt, taps[0][0], taps[1][0])
+        print(f"A: {sanitized(taps[0][0])}, B: {sanitized(taps[1][0])}; {words.certainty(doubt, is_one_clock)}")
+        _say(found, bool(senders), any(one.both for one in senders.values()))
         for name, ear in zip(words.TAPS, ears, strict=True):
             if ear.holes.total:
                 print(f"left out: {duration(ear.holes.total)} in which {name} heard nothing, by its own account")
@@ -85,10 +87,9 @@ def _taps(words: Sequence[str]) -> list[tuple[str, Capture]]:
     return [by_name[name] for name in wanted]
 
 
-def _say(found: Sequence[SegmentFault], heard: bool, common: bool, doubt: int, first: str, second: str) -> None:
+def _say(found: Sequence[SegmentFault], heard: bool, common: bool) -> None:
     from sniff.taps import words
 
-    print(f"A: {sanitized(first)}, B: {sanitized(second)}; {words.certainty(doubt)}")
     if not heard:
         print("no frame was heard while both taps listened")
     elif not common:

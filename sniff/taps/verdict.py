@@ -36,6 +36,10 @@ ALIKE = 0.8
 """Share of damaged frames that are damaged in the same way."""
 
 
+_ANY = 1 << 62
+"""ns; no delay tells a side."""
+
+
 class FaultPlace(Enum):
     """Where the fault is."""
 
@@ -155,11 +159,14 @@ def damage(sent: bytes, came: bytes) -> SegmentFaultKind:
     return SegmentFaultKind.BITS
 
 
-def faults(senders: Mapping[int, Traffic], doubt: int) -> list[SegmentFault]:
+def faults(senders: Mapping[int, Traffic], doubt: int, is_one_clock: bool = True) -> list[SegmentFault]:
     """What can be said: nothing where not one frame was heard at both. `doubt`: ns by which both adapters together may
-    misplace a frame."""
+    misplace a frame. `is_one_clock`: whether both taps are known to be on one; of two that differ everybody seems to
+    stand on one side."""
     if not any(one.both for one in senders.values()):
         return []
+    if not is_one_clock and len({one.side(doubt) for one in senders.values()} - {TapSide.UNKNOWN}) < 2:
+        doubt = _ANY
     return [fault for tap in (1, 0) if (fault := _fault(senders, tap, doubt)) is not None]
 
 

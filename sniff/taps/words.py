@@ -126,10 +126,11 @@ def _delays(delays: np.ndarray) -> list[float | None]:
     return [round(float(each) / 1e6, 3) for each in (least, median, high, most)]
 
 
-def certainty(doubt: int) -> str:
+def certainty(doubt: int, is_one_clock: bool) -> str:
     """What the delays are worth."""
-    off = milliseconds(doubt)
-    return f"delays run from A to B, negative from B to A; they are right to ± {off}, as far as the adapters allow"
+    clocks = "" if is_one_clock else ", if one clock stamped both"
+    off = f"± {milliseconds(doubt)}{clocks}"
+    return f"delays run from A to B, negative from B to A; they are right to {off}, as far as the adapters allow"
 
 
 def as_value(fault: SegmentFault) -> dict[str, object]:

@@ -57,3 +57,21 @@ def test_captures_of_different_days_have_nothing_in_common(tmp_path: Path, capsy
     far.write_text(Path(near[1]).read_text().replace("# start: 1970", "# start: 1999"))
     assert main(["taps", near[0], str(far)]) == 0
     assert "no frame was heard while both taps listened" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("ahead", [-200, 200])
+def test_two_clocks_that_differ_do_not_tell_where_somebody_stands(
+    ahead: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """All seem to stand behind the tap whose clock is behind; what is hit there would be that tap's own fault."""
+    paths = written(tmp_path, Segment(onward=bit_errors(0.1), back=bit_errors(0.1)))
+    for path, later in zip(map(Path, paths), (1000, 1000 + ahead), strict=True):
+        lines = path.read_text().splitlines()
+        first = next(place for place, line in enumerate(lines) if line.startswith("+"))
+        delay, _, octets = lines[first].partition(" ")
+        lines[first] = f"+{float(delay) + later:.6f} {octets}"
+        path.write_text("\n".join(lines))
+    assert main(["taps", *paths]) == 1
+    out = capsys.readouterr().out
+    assert "if one clock stamped both" in out
+    assert "itself, its adapter" not in out
