@@ -25,7 +25,7 @@ class ToldValues:
     """What readings say besides their bits, one entry a reading.
 
     `number`: finite, exact, no negative zero; `whole`: whether it is an int. `part`, `words`: places in `parts` and
-    `phrases`. `station`: whose thing it is.
+    `phrases`; `units`: as long as these, the unit of each that has one instead. `station`: whose thing it is.
     """
 
     number: Floats
@@ -35,10 +35,11 @@ class ToldValues:
     station: Numbers
     parts: tuple[str, ...] = ("",)
     phrases: tuple[str, ...] = ("",)
+    units: tuple[str, ...] = ("",)
 
     def take(self, which: Masks | Times) -> ToldValues:
         """Some of them."""
-        return replace(self, **{one.name: getattr(self, one.name)[which] for one in fields(self)[:-2]})
+        return replace(self, **{one.name: getattr(self, one.name)[which] for one in fields(self)[:-3]})
 
     def numbers(self) -> Iterator[int | float]:
         """As they are."""

@@ -30,7 +30,8 @@ class Reading:
     tables are, from 40001, 30001, 00001 and 10001, so that a table of another protocol needs another name. `address`:
     the place in it, as on the wire; `part`: the attribute or property, empty for the value itself. `raw`: the bits as
     they were on the wire, unsigned; None for text. `sure`: False where no public source confirms the layout. `words`:
-    the value in the protocol's own words, where it has some; `beside`: what came with it, as names and texts.
+    the value in the protocol's own words, where it has some; `beside`: what came with it, as names and texts; `unit`:
+    the one that the protocol itself fixes for the number.
     """
 
     space: str
@@ -43,6 +44,7 @@ class Reading:
     station: int | None = None
     words: str = field(default="", compare=False)
     beside: tuple[tuple[str, str], ...] = field(default=(), compare=False)
+    unit: str = field(default="", compare=False)
 
 
 Readings = Callable[[Frame | None, Frame | None], tuple[Reading, ...]]

@@ -36,3 +36,9 @@ OF_PARAMETERS: dict[str, str] = {
 
 ENDLESS = frozenset({"lifetime", "time-remaining"})
 """Of these 0 means that there is no end."""
+
+
+def unit_held(which: int, index: int | None, value: object) -> str:
+    """The unit of what a property, or an element of it, holds; empty where it has none, and for what is no number."""
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return OF_PROPERTIES.get(which, "") if is_number and index != 0 else ""  # element 0 is how many there are

@@ -217,16 +217,19 @@ class _Carriers(NamedTuple):
 
 
 class _Texts:
-    """Texts by the place where each stands."""
+    """Texts, each with a unit, by the place where it stands."""
 
     def __init__(self) -> None:
-        self._places: dict[str, int] = {"": 0}
+        self._places: dict[tuple[str, str], int] = {("", ""): 0}
 
-    def place(self, text: str) -> int:
-        return self._places.setdefault(text, len(self._places))
+    def place(self, text: str, unit: str = "") -> int:
+        return self._places.setdefault((text, unit), len(self._places))
 
     def all(self) -> tuple[str, ...]:
-        return tuple(self._places)
+        return tuple(text for text, _ in self._places)
+
+    def units(self) -> tuple[str, ...]:
+        return tuple(unit for _, unit in self._places)
 
 
 def _made(silent: Masks, rows: Times, carriers: _Carriers, properties: _Properties, octets: Octets) -> ReadingColumns:
@@ -245,7 +248,7 @@ def _made(silent: Masks, rows: Times, carriers: _Carriers, properties: _Properti
             called.append((False, 0, 0, 0))
             continue
         (one,) = readings
-        called.append((True, spaces.place(one.space), parts.place(one.part), phrases.place(one.words)))
+        called.append((True, spaces.place(one.space), parts.place(one.part), phrases.place(one.words, one.unit)))
     known, space, part, words = np.array(called, np.int32)[kind].T
     kept = known == 1
     done, exchange = silent.copy(), rows[kept]
@@ -260,5 +263,7 @@ def _made(silent: Masks, rows: Times, carriers: _Carriers, properties: _Properti
         raws[kept],
         np.where(reads, _READ, _WRITE).astype(np.uint8),
         spaces.all(),
-        ToldValues(numbers[kept], ~is_real[kept], part[kept], words[kept], station, parts.all(), phrases.all()),
+        ToldValues(
+            numbers[kept], ~is_real[kept], part[kept], words[kept], station, parts.all(), phrases.all(), phrases.units()
+        ),
     )

@@ -11,6 +11,7 @@ from dissectors.bacnet import message as messages
 from dissectors.bacnet import names
 from dissectors.bacnet.apdu import PduType
 from dissectors.bacnet.dates import Date, Time
+from dissectors.bacnet.fixed_units import unit_held
 from dissectors.bacnet.frame_types import HEADER
 from dissectors.bacnet.message import Message
 from dissectors.bacnet.values import BitString, ConstructedValue, Double, Enumerated, ObjectId, shortest, show
@@ -175,7 +176,10 @@ def _reading(
     raw, shown = _shown(value)
     if shown is None:
         return None
-    return Reading(thing.kind, thing.instance, raw, shown, how, part, station=station, words=_words(value, shown))
+    unit = unit_held(record["property-identifier"].value, index, value)
+    return Reading(
+        thing.kind, thing.instance, raw, shown, how, part, station=station, words=_words(value, shown), unit=unit
+    )
 
 
 def _shown(value: Any) -> tuple[int | None, int | float | str | None]:

@@ -14,7 +14,7 @@ from typing import Any
 
 from dissectors.bacnet import names
 from dissectors.bacnet.dates import Date, Time, week_and_day
-from dissectors.bacnet.fixed_units import ENDLESS, OF_PARAMETERS, OF_PROPERTIES
+from dissectors.bacnet.fixed_units import ENDLESS, OF_PARAMETERS, unit_held
 from dissectors.bacnet.station_address import mac_text
 from dissectors.bacnet.tags import Tag
 
@@ -347,9 +347,8 @@ def show_part(name: str, value: Any, depth: int = 0) -> str:
 
 def show_held(which: int, index: int | None, value: Any) -> str:
     """What a property, or an element of it, holds: numbers with the unit that the standard fixes for it."""
-    unit = OF_PROPERTIES.get(which) if index != 0 else None  # element 0 is how many there are
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return f"{show(value)} {unit}" if unit is not None and is_number else show(value)
+    unit = unit_held(which, index, value)
+    return f"{show(value)} {unit}" if unit else show(value)
 
 
 def show_tag(tag: Tag, depth: int = 0) -> str:

@@ -253,7 +253,7 @@ def each_bit(entry: Entry, raw: int) -> list[tuple[str, EntryRole]]:
 def _plain(reading: Reading) -> Value:
     name = point_name(reading.space, reading.address, reading.part)
     quality = _quality(reading, reading.value)
-    return Value(name, reading.value, reading.raw, "", quality, reading, words=_spoken(reading))
+    return Value(name, reading.value, reading.raw, reading.unit, quality, reading, words=_spoken(reading))
 
 
 def _spoken(reading: Reading) -> str:
@@ -266,7 +266,7 @@ def _attribute(profile: Profile, reading: Reading) -> Value:
     entry = profile.at(reading.space, reading.address)
     base = plain_name(reading.space, reading.address) if entry is None or entry.reserved else entry.name
     quality, words = _quality(reading, reading.value), _spoken(reading)
-    return Value(f"{base}/{reading.part}", reading.value, reading.raw, "", quality, reading, words=words)
+    return Value(f"{base}/{reading.part}", reading.value, reading.raw, reading.unit, quality, reading, words=words)
 
 
 def _values(entry: Entry, reading: Reading, raws: Sequence[int | None]) -> Iterable[Value]:

@@ -65,6 +65,11 @@ class PlainSamples:
         told = self.told
         return ("",) * len(self) if told is None else (told.phrases[at] for at in told.words.tolist())
 
+    def units(self) -> Iterable[str]:
+        """Of each, where the protocol itself fixes one."""
+        told = self.told
+        return ("",) * len(self) if told is None else (told.units[at] for at in told.words.tolist())
+
     def _parts_and_stations(self) -> tuple[Iterable[str], Iterable[int | None]]:
         told = self.told
         if told is None:
@@ -94,13 +99,15 @@ class PlainSamples:
         """All as objects."""
         numbers = (self.time, self.device, self.frame, self.space, self.address, self.raw, self.how)
         columns = zip(*(one.tolist() for one in numbers), strict=True)
-        told = zip(self.values(), self.words(), *self._parts_and_stations(), strict=True)
-        for (time, device, frame, space, address, raw, how), (number, words, part, station) in zip(
+        told = zip(self.values(), self.words(), self.units(), *self._parts_and_stations(), strict=True)
+        for (time, device, frame, space, address, raw, how), (number, words, unit, part, station) in zip(
             columns, told, strict=True
         ):
-            reading = Reading(self.spaces[space], address, raw, number, HOWS[how], part, station=station, words=words)
+            reading = Reading(
+                self.spaces[space], address, raw, number, HOWS[how], part, station=station, words=words, unit=unit
+            )
             name = point_name(reading.space, address, part)
-            value = Value(name, number, raw, "", Quality.GOOD, reading, words=words)
+            value = Value(name, number, raw, unit, Quality.GOOD, reading, words=words)
             yield Sample(time, None if device == NONE else device, value, frame)
 
 
@@ -186,6 +193,11 @@ class PointRun:
         """Times, ns, and values."""
         places, plain = self.places, self.plain
         return zip(plain.time[places].tolist(), plain.number[places].astype(float).tolist(), strict=True)
+
+    @property
+    def unit(self) -> str:
+        """Of the first."""
+        return next(iter(self.plain.take(self.places[:1]).units()))
 
     def add_to(self, table: PointTable) -> None:
         """Give a table of points all of them."""

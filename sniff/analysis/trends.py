@@ -91,7 +91,7 @@ class Trends:
         self._series.add_samples(TableSamples(samples.plain, undescribed))
         for one in by_point(TableSamples(_named_ones(samples.plain), samples.others)):
             if isinstance(one, PointRun):
-                self._add(one.key, "", one.numbers())
+                self._add(one.key, one.unit, one.numbers())
             else:
                 self._take(one)
 

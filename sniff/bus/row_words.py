@@ -141,7 +141,7 @@ def values_of(item: JudgedRow, dissector: Dissector) -> list[dict[str, Any]]:
             "text": one.text,
             "name": one.value.name if one.value is not None and one.value.entry is not None else None,
             "title": one.title or None,
-            "unit": one.value.unit if one.value is not None and one.value.entry is not None else None,
+            "unit": one.value.unit if one.value is not None and (one.value.entry or one.value.unit) else None,
             "bits": dict(one.parts),
         }
         for one in item.meaning.items(dissector.place)

@@ -366,10 +366,10 @@ def _cells(samples: TableSamples) -> Iterator[tuple[Cell, ...]]:
     (points, which), hows = plain.points(), [how.value for how in HOWS]
     stamps = [f"{stamp}Z" for stamp in np.datetime_as_string(plain.time.view("M8[ns]")).tolist()]
     columns = zip(*(column.tolist() for column in (which, plain.raw, plain.how, plain.frame)), strict=True)
-    for stamp, (point, raw, how, frame), value, words in zip(
-        stamps, columns, plain.values(), plain.words(), strict=True
+    for stamp, (point, raw, how, frame), value, unit, words in zip(
+        stamps, columns, plain.values(), plain.units(), plain.words(), strict=True
     ):
-        yield stamp, *points[point], value, raw, "", 0, hows[how], frame, words
+        yield stamp, *points[point], value, raw, unit, 0, hows[how], frame, words
 
 
 def _sample(sample: Sample) -> tuple[Cell, ...]:

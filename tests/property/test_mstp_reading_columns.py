@@ -42,7 +42,7 @@ Exchange = tuple[bytes, bytes | None]
 
 OBJECTS = (0, 1, 2, 3, 4, 8, 10, 13, 14, 17, 19, 20, 40, 62, 128, 1023)
 ENUMERATED = (117, 36, 103, 112)
-PROPERTIES = (85, 85, *ENUMERATED, 28, 74, 87, 76, 104, 62, 77, 79, 81, 111, 512, 4194, 65535)
+PROPERTIES = (85, 85, *ENUMERATED, 28, 74, 87, 76, 104, 62, 77, 79, 81, 111, 512, 4194, 65535, 11, 134)
 SINGLES = (0.0, -0.0, 59.9, 1e-45, -1.5, 3.4e38, float("inf"), float("nan"), 16777217.0)
 
 
@@ -120,7 +120,7 @@ def by_columns(exchanges: Sequence[Exchange]) -> ReadingColumns:
 
 def _everything(reading: Reading) -> tuple[object, ...]:
     """With what its equality leaves out."""
-    return reading, type(reading.value), repr(reading.value), reading.words, reading.beside
+    return reading, type(reading.value), repr(reading.value), reading.words, reading.beside, reading.unit
 
 
 def assert_alike(exchanges: Sequence[Exchange]) -> ReadingColumns:
@@ -140,6 +140,7 @@ def assert_alike(exchanges: Sequence[Exchange]) -> ReadingColumns:
                     told.parts[told.part[at]],
                     station=int(told.station[at]),
                     words=told.phrases[told.words[at]],
+                    unit=told.units[told.words[at]],
                 )
             )
     for (asked, answered), mine, done in zip(exchanges, found, made.done.tolist(), strict=True):
@@ -160,6 +161,7 @@ def test_any_exchanges(seed: int) -> None:
     assert made.told is not None
     assert len(made.told.parts) > 10
     assert len(made.told.phrases) > 10
+    assert {"ms", "× 10 ms"} <= set(made.told.units)
 
 
 def _pairs(frames: Iterable[bytes]) -> Iterator[Exchange]:

@@ -1,4 +1,4 @@
-"""Numbers whose unit the standard fixes stand with it, in the line and in the tree."""
+"""Numbers whose unit the standard fixes stand with it, in the line, in the tree and beside points."""
 
 from __future__ import annotations
 
@@ -8,11 +8,15 @@ import pytest
 
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import codec, names, services
+from dissectors.bacnet.envelope import npdu_frame
 from dissectors.bacnet.fixed_units import OF_PROPERTIES
 from dissectors.bacnet.packets.outlines import outlined
 from dissectors.bacnet.property_types import PROPERTY_TYPES
+from dissectors.bacnet.readings import readings
 from dissectors.bacnet.text import parameters_text
 from dissectors.bacnet.values import Signed
+from dissectors.frame import Check, FoundBy, Frame
+from dissectors.profiles.decoding import decode
 
 
 def line(kind: int, service: int, values: dict[str, Any]) -> str:
@@ -59,3 +63,15 @@ def test_only_numbers_have_units():
     kinds = {PROPERTY_TYPES[number] for number in OF_PROPERTIES}
     assert kinds <= {"Unsigned", "{Unsigned}", "Signed", "Real"}
     assert all(number in names.PROPERTIES for number in OF_PROPERTIES)
+
+
+@pytest.mark.parametrize(
+    ("number", "value", "text"), [("apdu-timeout", 3000, "3000 ms"), ("number-of-apdu-retries", 3, "3")]
+)
+def test_points_have_them(number: str, value: object, text: str):
+    about = {"object-identifier": "device,1", "property-identifier": number, "property-value": value}
+    apdu = apdus.encode(3, service=12, invoke_id=1) + codec.encode(services.ACK[12], about)
+    octets = npdu_frame(1, 9, b"\x01\x00" + apdu, False)
+    (told,) = readings(Frame("mstp", octets, 0, 0, Check.GOOD, FoundBy.LENGTH), None)
+    (point,) = decode(None, (told,))
+    assert point.text == text
