@@ -179,6 +179,7 @@ class N2Findings:
             if self.torn.may_answer(transaction.response):
                 return  # the command that it answers was torn
             station.late.add(transaction.start, transaction.response)
+            station.silence.heard()
             station.missing.take_back(transaction.of)
             station.unheard.take_back(transaction.of)
             self.masters.see_late(transaction, station)
@@ -196,10 +197,14 @@ class N2Findings:
         station.asked += 1
         station.only_identify &= asked.command.type.kind == "identify"
         verdict = transaction.verdict
+        if verdict is not Verdict.NO_RESPONSE:
+            station.silence.heard()
         if transaction.response is None:
             if verdict is Verdict.NO_RESPONSE:
                 if self.torn.is_answered(transaction.request):
+                    station.silence.heard()
                     return
+                station.silence.miss(transaction.start, transaction.request, is_repeat=transaction.attempt > 1)
                 if self.patience.tells(asked, transaction.attempt, self.masters.newest):
                     station.unheard.add(transaction.id, transaction.end, transaction.request)
                     return

@@ -143,6 +143,7 @@ class _Judging:
         self._count(which)
         for at in (begin + np.flatnonzero(self._events[which])).tolist():
             self._see_event(at)
+        self._see_silence(begin, end)
         self._see_late(begin, end)
         self._see_fits(begin, end)
         judge.newest = int(frames.start[stretch.stop - 1])
@@ -207,6 +208,21 @@ class _Judging:
                 after = int(rows.frames.start[place + 1])
                 judge.unanswered(station, int(start[at]), int(self._closed.end[at]), after)
             at += 1
+
+    def _see_silence(self, begin: int, end: int) -> None:
+        """What stations left without an answer since they were heard last; where they were, `_count` has ended it."""
+        judge, rows, found, closed = self._judge, self._rows, self.found, self._closed
+        unit, answered = found.unit[begin:end], found.answered[begin:end]
+        missed = ~(answered | found.to_all[begin:end])
+        for one in np.unique(unit[missed]).tolist():
+            its = unit == one
+            heard = np.flatnonzero(its & answered)
+            since = int(heard[-1]) if len(heard) else -1
+            silence = judge.station(one).silence
+            for at in (begin + np.flatnonzero(its & missed)).tolist():
+                if at - begin > since:
+                    no = rows.first + int(found.stretches.request[at])
+                    silence.miss(int(closed.start[at]), no, is_repeat=int(closed.attempt[at]) > 1)
 
     def _see_event(self, at: int) -> None:
         """What changes what is known of a station."""
@@ -278,6 +294,7 @@ def _add(
     station.asked += asked
     station.only_identify &= not other
     if answered:
+        station.silence.heard()
         station.answered += answered
         station.sent.frames += answered
         station.sent.octets += octets

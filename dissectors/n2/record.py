@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from dissectors.findings import Tally
 from dissectors.frame import Flaw
+from dissectors.last_silence import LastSilence
 from dissectors.n2.misfits import Misfits
 
 _RECALLED = 16  # unanswered commands that a late answer may still answer
@@ -120,6 +121,7 @@ class N2StationRecord:
     missing: Missing = field(default_factory=Missing)
     behind: Tally = field(default_factory=Tally)  # damaged commands directly behind one to it that nothing followed
     unheard: Missing = field(default_factory=Missing)  # the same, where the master had an answer
+    silence: LastSilence = field(default_factory=LastSilence)  # both, since it was heard last
     resets: Tally = field(default_factory=Tally)
     resets_told: Tally = field(default_factory=Tally)  # those that its master told it to make
     slow: Tally = field(default_factory=Tally)

@@ -57,7 +57,8 @@ RULES: dict[str, Rule] = {
             Severity.WARNING,
             "no answer",
             "Commands that no answer followed, not even a late one. An error where the master turned to a station "
-            "several times, or over 11 times at once, and got none. A single turn is only noted, or fewer than 1 in "
+            "several times, or over 11 times at once, and got none, or none to the last five and more, up to the end. "
+            "A single turn is only noted, or fewer than 1 in "
             "100 and not surely over two a minute; and so are many addresses that are only asked who they are: a scan. "
             "Where several are asked and nobody but the master is heard, one finding names the bus.",
             "station off, wrong address or wrong baud rate, or a broken wire; all of them: one between them and here",

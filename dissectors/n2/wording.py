@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from dissectors.chances import at_least, is_rare
 from dissectors.findings import Finding, Severity, Tally, counted, times, together
 from dissectors.frame import Flaw
+from dissectors.last_silence import fallen_silent
 from dissectors.line import MS, NS_PER_S
 from dissectors.n2 import meanings
 from dissectors.n2.blame import blamed
@@ -258,7 +259,9 @@ def _missing(heard: N2Evidence, name: str, station: N2StationRecord) -> Finding:
             return tally.found(rule, name, f"no answer to {tries}", Severity.NOTE)
         return tally.found(rule, name, f"no answer to any of {counted(station.asked, 'command')}", Severity.ERROR)
     finding = tally.found(rule, name, f"no answer to {tally.count} of {counted(station.asked, 'command')}")
-    return heard.noted_if(heard.is_rare(tally, station.asked), finding)
+    finding = heard.noted_if(heard.is_rare(tally, station.asked), finding)
+    is_unheard = heard.unheard(station).count > 0  # then it may be this tap alone that hears nothing of it
+    return finding if is_unheard else fallen_silent(finding, station.silence, heard.now)
 
 
 # --- stations ---

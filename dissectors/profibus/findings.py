@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, times
 from dissectors.frame import Event, Frame, Header, Role
+from dissectors.last_silence import fallen_silent
 from dissectors.line import NS_PER_S, Timing
 from dissectors.profibus.blame import ONE_STATION, SentOctets
 from dissectors.profibus.configuration import parse_configuration
@@ -170,7 +171,7 @@ class ProfibusFindings:
         elif silent.count and record.answers:
             grave = _grave(record.silent, total)
             seen = f"{silent.count} of {total} requests without answer{_unheard_seen(record)}"
-            yield silent.found(RULES["PB002"], who, seen, grave)
+            yield fallen_silent(silent.found(RULES["PB002"], who, seen, grave), record.silence, self.watch.ring().last)
         if record.twice.count:
             often = record.twice.count >= _LEAST and record.twice.count >= _SHARE * total
             grave = Severity.ERROR if often else Severity.NOTE

@@ -85,6 +85,7 @@ class _Judging:
             record.exchanged += len(mine)
             record.answers += len(mine)
             record.before = Verdict.ANSWERED
+            record.silence.heard()
             told = mine[-2:] if record.is_clear else np.append(mine[:1], mine[1:][-2:])
             for place in units.request[told].tolist():
                 record.ask(self._rows.first + place, octets_of(self._rows, place))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from dissectors.findings import EVIDENCE_MAX, Tally
 from dissectors.frame import Flaw, Frame
+from dissectors.last_silence import LastSilence
 from dissectors.profibus.check_mistakes import ways
 from dissectors.profibus.services import Service
 from dissectors.profibus.telegram import parse
@@ -45,6 +46,7 @@ class RequestsRecord:
     exchanged: int = 0
     put_off: int = 0
     unheard: int = 0
+    silence: LastSilence = field(default_factory=LastSilence)
     checks: WrongChecks = field(default_factory=WrongChecks)  # of the damaged answers
     flaws: dict[Flaw, Tally] = field(default_factory=dict)  # likewise: of those that one change makes good
     _newest: tuple[int, bytes] | None = None  # the newest request: its row and octets
@@ -55,7 +57,7 @@ class RequestsRecord:
         """A request is sent."""
         self._previous, self._newest = self._newest, (no, octets)
         if self._silent is not None:
-            self.unheard += _counts_on(self._silent[1], octets)
+            self._go_on(self._silent[1], octets)
             self._silent = None
 
     @property
@@ -91,8 +93,11 @@ class RequestsRecord:
             if self.before in _WELL:
                 self.repeated.add(closed.start, closed.request)
         self.before = verdict
+        if verdict is not Verdict.NO_RESPONSE:
+            self.silence.heard()
         if verdict is Verdict.NO_RESPONSE:
             self.unanswered.add(closed.start, closed.request)
+            self.silence.miss(closed.start, closed.request, is_repeat=closed.attempt > 1)
             self.fresh += closed.attempt == 1
             self._miss(closed.request)
         elif verdict is Verdict.DAMAGED_ANSWER:
@@ -110,7 +115,13 @@ class RequestsRecord:
         if newest is not None and newest[0] == no:
             self._silent = newest
         elif newest is not None and previous is not None and previous[0] == no:
-            self.unheard += _counts_on(previous[1], newest[1])
+            self._go_on(previous[1], newest[1])
+
+    def _go_on(self, before: bytes, after: bytes) -> None:
+        """The master asked again or something else, behind a request whose answer was not heard."""
+        if _counts_on(before, after):
+            self.unheard += 1
+            self.silence.heard()
 
     def is_slow(self, least: int, time: int, *rows: int | None) -> None:
         """Take an answer that came too late, after `least` ns."""

@@ -27,7 +27,8 @@ RULES: dict[str, Rule] = {
             Severity.NOTE,
             "some requests without answer",
             "A station answers, but not always. A warning from 3 and 1 in 100 requests on; those do not count after "
-            "which the master counts on (frame count bit): it had the answer.",
+            "which the master counts on (frame count bit): it had the answer. An error where none of the last five and "
+            "more was answered, up to the end.",
             "a loose connector, a station that is reset or too busy, disturbances that only it hears",
             "connector, shield and terminators at this station; whether it happens at certain times",
             explains=("PB003", "PB007"),

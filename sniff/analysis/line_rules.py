@@ -38,7 +38,7 @@ _DAMAGE = (
 
 _DAMAGED = (
     *("MB005", "MB006", "MB007", "MB009", "MB011", "MB012", "MB015", "MB021"),
-    *("N2004", "MS401", "MS402"),
+    *("N2004", "MS401", "MS402", "PB008"),
 )
 """What tells of damaged frames whose they are, and so tells of their line errors and remains."""
 

@@ -16,8 +16,8 @@ from sniff.simulation.scenarios import Scenario, simulate
 from sniff.simulation.tap import TapModel
 from sniff.simulation.wire import Party
 from tests.faults.buses import MS, N2_LINE, n2
-from tests.faults.case import Case, Heard
-from tests.faults.stations import Wrapped
+from tests.faults.case import Case, Heard, Said
+from tests.faults.stations import Dies, Wrapped
 from tests.faults.workbench import N2, by_turns, follower
 
 S = 1_000 * MS
@@ -96,6 +96,13 @@ _INNOCENT = ("N2007", "N2008")
 _DRIVE = (("N2012", "station 2"),)
 
 N2_RULE_CASES: tuple[Case, ...] = (
+    Case(
+        "N2 station dies beside noise",
+        partial(n2, (BitFlips(0.001),), change={2: partial(Dies, at=10 * S)}),
+        (Said(("station 2",), words="none to the last", own_words=True), ("N2004", "bus")),
+        seconds=30,
+        seeds=2,
+    ),
     Case(
         "N2 answered twice",
         partial(n2, change={2: partial(Twinned, address=2, after=3 * MS)}, pause=150 * MS),

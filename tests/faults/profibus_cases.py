@@ -346,6 +346,13 @@ PROFIBUS_CASES: tuple[Case, ...] = (
         seeds=1,
     ),
     Case(
+        "PROFIBUS slave dies beside noise",
+        partial(profibus, (BitFlips(0.0003),), change={"drive 6": partial(Off, at=3 * S)}),
+        (Said(("station 6",), words="none to the last", own_words=True), ("PB008", "bus")),
+        seconds=8,
+        seeds=2,
+    ),
+    Case(
         "PROFIBUS master switched off",
         partial(profibus, change={"second master": partial(Off, at=5 * S)}),
         (("PB014", "station 2"),),
