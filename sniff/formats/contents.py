@@ -23,6 +23,7 @@ _HIGH = bytes(range(0x80, 0x100))
 _WINDOW = re.compile(rb"\x1b\][0-9]{1,3};[^\x00-\x1f]{0,400}(?:\x07|\x1b\\)")
 
 _CONTROLS_MOST = 0.01
+_DUMPED_LEAST, _DIGITS = 64, b"0123456789ABCDEFabcdefx ,;:-\t"
 _UTF16_LEAST, _UTF16_ZEROS = 16, 0.9
 _ASCII_FRAME = re.compile(rb":((?:[0-9A-F]{2}){3,260})(?=[\r\n]|$)")
 _N2_FRAME = re.compile(rb"[>A]([0-9A-F]{2,260})([0-9A-F]{2})(?=[\r\n]|$)")
@@ -72,9 +73,14 @@ def utf16_of(start: bytes) -> str | None:
         zeros, others = seen[first::2], seen[1 - first :: 2]
         if len(seen) < _UTF16_LEAST or zeros.count(0) < _UTF16_ZEROS * len(zeros) or 0 in others:
             continue
-        if all(octet in _WRITTEN for octet in others) and (b"\n" in others or b"\r" in others):
+        if all(octet in _WRITTEN for octet in others) and (b"\n" in others or b"\r" in others or _is_dumped(others)):
             return codec
     return None
+
+
+def _is_dumped(others: bytes) -> bool:
+    """Whether a text that begins with so long a line is nothing but digits, and what stands between them."""
+    return len(others) >= _DUMPED_LEAST and not others.translate(None, delete=_DIGITS)
 
 
 def is_written(start: bytes) -> bool:

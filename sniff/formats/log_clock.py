@@ -155,7 +155,7 @@ CLOCKS: tuple[Clock, ...] = (
     Clock("date and time without signs", _clock(
               r"(?P<packed>(?:19|20)\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])[T_ -]?"
               r"(?:[01]\d|2[0-3])[0-5]\d[0-5]\d(?:[.,]\d{1,9})?)(?P<zone>Z?)(?![0-9A-Za-z])"), _packed,
-          dated=True, first=True),
+          dated=True),
     Clock("TAI64N", _clock(r"@(?P<tai>4[0-9a-f]{15})(?P<nano>[0-3][0-9a-f]{7})(?![0-9a-f])"), _tai, dated=True,
           first=True),
     Clock("ms since the epoch", _clock(r"(?P<number>1\d{12})(?=[\s:;,\])|])"), _scaled(MS), dated=True, first=True),

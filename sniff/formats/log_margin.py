@@ -24,6 +24,7 @@ _CODE = re.compile(r"(?:(?<=[\s|])|^)(?:`{3,}|(?P<marks>`{1,2})(?P<code>[^`]+)(?
 """Code in a text: marks stand around it, and none of the octets is a mark."""
 _ENTITIES = {"&gt;": ">", "&lt;": "<", "&amp;": "&", "&nbsp;": " ", "&quot;": '"', "&#39;": "'"}
 _QUOTE = re.compile(r"(?:> ?){1,8}(?=\S|$)")
+_NUMBER_ALONE = re.compile(r"\s*[\[(#|]?\s*(?P<number>\d{1,9})[\])}:.|,;]*\s*")
 _NUMBER = re.compile(r"\s*[\[(#|]?\s*(?P<number>\d{1,9})(?P<behind>\s*[\])}:.|,;]+\s*|\t|\s+)(?=\S)")
 _NAMES = re.compile(
     r"(?:(?<![0-9A-Za-z.:-])(?:(?!0\d)\d{1,3}\.){3}(?!0\d)\d{1,3}(?::\d{1,5})?(?![0-9.])"
@@ -81,6 +82,8 @@ class Margin:
             text = _QUOTE.sub("", text, count=1) if _QUOTE.match(text) else text
         if self.numbers and (match := _NUMBER.match(text)) is not None:
             text = " " * (match.end() > 1) + text[match.end() :]
+        elif self.numbers and _NUMBER_ALONE.fullmatch(text) is not None:
+            text = ""  # of an empty line
         if (self.ahead or self.behind) and (counted := _counted(text)) is not None:
             at, end, before = counted
             if self.ahead if before else self.behind:
@@ -155,10 +158,12 @@ def _are_numbered(lines: Sequence[str]) -> bool:
     in hexadecimal and have the same between them as all others.
     """
     found = [match for text in lines if (match := _NUMBER.match(text)) is not None]
-    if len(found) < LEAST or 2 * len(found) < len(lines):
+    alone = [match for text in lines if (match := _NUMBER_ALONE.fullmatch(text)) is not None]  # of an empty line
+    if len(found) < LEAST or 2 * (len(found) + len(alone)) < len(lines) or len(alone) > len(found):
         return False
     numbers = [Decimal(match["number"]) for match in found]
-    if not is_count(numbers):
+    of_all = sorted(Decimal(match["number"]) for match in (*found, *alone))
+    if not is_count(numbers) and not is_count(of_all):
         return False
     if any(len(match["number"]) == 2 for match in found) and all(match["behind"] == " " for match in found):
         tens = any(len(match["number"]) == 2 and int(match["number"]) % 10 == 0 for match in found)

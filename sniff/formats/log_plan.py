@@ -44,6 +44,7 @@ _NUMBERED = 0.6
 _MOSTLY = 0.8
 _GROWN = 0.2
 _TELLING = 3
+_NO_WORD = 64  # octets of one line that stands alone under a letter
 _BACK = 0.2
 _FIXED_LEAST = 3  # lines of one width, before they are taken for the width of a table
 _WIDTHS = (8, 10, 12, 16, 20, 24, 32, 40, 48, 64)
@@ -248,7 +249,14 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
     told = sum(len(line.octets) for line in data)
     if not data or (told < 3 and not known and written > len(data)):
         return None
-    if main == "" and main not in directed and 3 * len(data) < written and not _are_headed(lines):
+    longest = max(len(line.octets) for line in data)
+    if (
+        main == ""
+        and main not in directed
+        and 3 * len(data) < written
+        and longest < _NO_WORD
+        and not _are_headed(lines)
+    ):
         return None  # a word here and there
     octetwise = 2 * sum(len(line.octets) == 1 for line in data) > len(data)
     return Plan(

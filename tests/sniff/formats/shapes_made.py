@@ -122,6 +122,11 @@ add("bom-crlf", "\ufeff" + lines(lambda i, f: f"{way(i)}: {hx(f)}").replace("\n"
 add("utf16le-bom", lines(lambda i, f: f"{way(i)}: {hx(f)}").replace("\n", "\r\n"), enc="utf-16")
 add("utf16be-bom", b"\xfe\xff" + lines(lambda i, f: f"{way(i)}: {hx(f)}").encode("utf-16-be"))
 add("utf16le-nobom", lines(lambda i, f: f"{way(i)}: {hx(f)}").encode("utf-16-le"))
+add("utf16le-nobom-one-line", " ".join(map(hx, FR)).encode("utf-16-le"))
+add(
+    "line-numbers-of-empty-lines", lines(lambda i, f: f"{2 * i + 1}\t10:00:{i:02d}.100 {way(i)} {hx(f)}\n{2 * i + 2}\t")
+)
+add("one-line-under-a-letter", "Hello all,\nhere is the log of 12.03.2026.\nRegards, J.\n\n\n" + " ".join(map(hx, FR)))
 add("utf16be-nobom", lines(lambda i, f: f"{way(i)}: {hx(f)}").encode("utf-16-be"))
 add(
     "utf16-cyrillic",
