@@ -72,16 +72,14 @@ def _reader(path: Path, start: bytes) -> Callable[[Path], Capture]:
     if not start:
         raise CaptureError(f"{path}: an empty file")
     found = table.told(start, path.name)
-    is_container = start.startswith(tuple(magic for magic, _ in table.UNREADABLE))  # it holds frames by chance only
-    damaged = found is not None and not found.last and not found.recognises(start) and not is_container
+    other = table.unreadable(start)  # it holds frames by chance only
+    damaged = found is not None and not found.last and not found.recognises(start) and other is None
     if damaged and found is not None and _holds_frames(start):
         from sniff.formats import raw_dump
 
         return lambda place: raw_dump.RawDump(place, f"; its name says {found.name}, and it is none")
-    if found is None or found.last:
-        for magic, what in table.UNREADABLE:
-            if start.startswith(magic):
-                raise CaptureError(f"{path}: {what}")
+    if (found is None or found.last) and other is not None:
+        raise CaptureError(f"{path}: {other}")
     if found is None:
         raise CaptureError(f"{path}: no capture that this program reads")
     opened: Callable[[Path], Capture] = table.function(found.reader)

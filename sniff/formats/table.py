@@ -116,6 +116,14 @@ UNREADABLE: tuple[tuple[bytes, str], ...] = (
     (b"snoop\0\0\0", "a snoop capture; convert it with `editcap -F pcapng`"),
 )
 """How files begin that no format reads, and what to do with each."""
+_TAR, _TAR_AT = b"ustar", 257
+
+
+def unreadable(start: bytes) -> str | None:
+    """What a file is that begins so, and what to do with it, where no format reads it; None for all others."""
+    if start.startswith(_TAR, _TAR_AT):
+        return "a tar archive; unpack it, and name the capture in it"
+    return next((what for magic, what in UNREADABLE if start.startswith(magic)), None)
 
 
 def formats() -> tuple[Format, ...]:

@@ -7,6 +7,7 @@ import gzip
 import lzma
 import random
 import shutil
+import tarfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -98,6 +99,16 @@ def test_what_is_no_capture_is_refused_by_its_name(magic: bytes, what: str, tmp_
     path = tmp_path / "x.log"
     path.write_bytes(magic + random.Random(1).randbytes(400))
     with pytest.raises(CaptureError, match=what.split(";")[0].replace("(", ".")):
+        read(path)
+
+
+@pytest.mark.parametrize("wrapped", [False, True])
+def test_a_tar_archive_is_refused_by_its_name(wrapped: bool, tmp_path: Path) -> None:
+    (tmp_path / "night.log").write_text("10:00:00.100 01 03 00 00 00 02 C4 0B\n")
+    path = tmp_path / ("x.tar.gz" if wrapped else "x.log")
+    with tarfile.open(path, "w:gz" if wrapped else "w") as archive:
+        archive.add(tmp_path / "night.log", "night.log")
+    with pytest.raises(CaptureError, match="a tar archive; unpack it"):
         read(path)
 
 
