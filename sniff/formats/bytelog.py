@@ -330,10 +330,21 @@ def _heading(lines: list[str]) -> tuple[int, TableLayout] | None:
     for number, line in enumerate(map(plain_signs, lines[:20])):
         if not line.strip() or line.lstrip().startswith(REMARK):
             continue
-        table = heading_of(line, delimiter_of(line), lines[number + 1 : number + 500])
-        if table is not None:
+        below = lines[number + 1 : number + 500]
+        table = heading_of(line, delimiter_of(line), below)
+        if table is not None and _has_times(table, below):
             return number, table
     return None
+
+
+def _has_times(table: TableLayout, lines: list[str]) -> bool:
+    """Whether a table's column of times holds any; else its lines are read as those of a log, which has more clocks."""
+    told = unread = 0
+    for row in _each(csv.reader(map(plain_signs, lines), delimiter=table.delimiter)):
+        if row is not None and any(row) and table.holds(row):
+            is_read = table.has_time(row)
+            told, unread = told + is_read, unread + (not is_read)
+    return told > 0 or not unread
 
 
 def _decoded(stream: BinaryIO, codec: str) -> Iterator[str]:

@@ -8,14 +8,16 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from decimal import Decimal
 
+from dissectors.checksums import ends_with_crc16
 from dissectors.line import MS, NS_PER_S
 from dissectors.quick_values import quickly_made
 from sniff.formats.log_times import AS_WRITTEN, BARE, EPOCH, Order, Times, day_of
 from sniff.formats.table_cells import MOST, UNITS, seconds
 
-_TIME = (  # behind the seconds octets may follow: ,01CB
-    r"(?P<clock>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9}(?!\d|[A-Fa-f](?![Mm]\b))|:\d{3}(?![\d:]))?)"
-    r"(?!\d|:[0-9A-Za-z])(?: ?(?P<half>[AaPp][Mm])\b)?"
+_TIME = (
+    r"(?:(?P<ahead>[AaPp]\.?[Mm]\.?|上午|下午|오전|오후) ?)?"
+    r"(?P<clock>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9}(?!\d|[A-Fa-f](?![Mm]\b))|:\d{3}(?![\d:]))?)"  # ,01CB are octets
+    r"(?!\d|:[0-9A-Za-z])(?:[ \u00a0\u202f]?(?P<half>[AaPp](?:[Mm]\b|\. ?[Mm]\.)))?"
 )
 _MONTHS = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
 _MONTH = r"(?P<month>Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec)[a-z]*"
@@ -63,30 +65,39 @@ class Clock:
 def _dated(match: re.Match[str], order: Order | None) -> int:
     found = match.groupdict()
     zone = found.get("zone") or ""
-    east = 0
-    if zone[:1] in ("+", "-"):
-        east = (int(zone[1:3]) * 60 + int(zone[-2:])) * 60 * NS_PER_S * (1 if zone[0] == "+" else -1)
-    return midnight(found["date"], order) + _of_day(match) - east
+    return midnight(found["date"], order) + _of_day(match) - _east(zone)
+
+
+def _east(zone: str) -> int:
+    """ns that a time of a zone is ahead of UTC."""
+    zone = zone.strip()
+    if zone[:1] not in ("+", "-"):
+        return 0
+    return (int(zone[1:3]) * 60 + int(zone[-2:])) * 60 * NS_PER_S * (1 if zone[0] == "+" else -1)
 
 
 def _named_month(match: re.Match[str], _order: Order | None) -> int:
     found = match.groupdict()
-    year, month, day = int(found.get("year") or 1970), _MONTHS.index(found["month"].lower()[:3]) + 1, int(found["day"])
-    return _midnight(year, *((3, 1) if _is_leap_day(found) else (month, day))) + _of_day(match)
+    year, name = int(found.get("year") or 1970), found["month"].lower()
+    month, day = _MONTHS.index(name[:3]) + 1 if name[0].isalpha() else int(name), int(found["day"])
+    midnight = _midnight(year, *((3, 1) if _is_leap_day(found) else (month, day)))
+    return midnight + _of_day(match) - _east(found.get("zone") or "")
 
 
 def _is_leap_day(found: Mapping[str, str | None]) -> bool:
     """Whether a date without a year is one that only some have."""
-    return not found.get("year") and (found.get("month") or "").lower()[:3] == "feb" and found["day"] == "29"
+    is_february = (found.get("month") or "").lower()[:3] in ("feb", "2", "02")
+    return not found.get("year") and is_february and found["day"] == "29"
 
 
 def _of_day(match: re.Match[str], _order: Order | None = None) -> int:
     """ns since midnight."""
     hours, minutes, *rest = match["clock"].replace(",", ".").split(":")
     hour = int(hours)
-    half = (match.groupdict().get("half") or "").lower()
+    found = match.groupdict()
+    half = (found.get("half") or found.get("ahead") or "").lower()
     if half:
-        hour = hour % 12 + (12 if half == "pm" else 0)
+        hour = hour % 12 + (12 if half[0] in "p下" or half == "오후" else 0)
     return (hour * 60 + int(minutes)) * 60 * NS_PER_S + seconds(".".join(rest))
 
 
@@ -110,8 +121,22 @@ def _dashed(match: re.Match[str], _order: Order | None) -> int:
 def _packed(match: re.Match[str], _order: Order | None) -> int:
     digits, _, parts = re.sub(r"[T_ -]", "", match["packed"]).replace(",", ".").partition(".")
     year, month, day, hour, minute = (int(digits[:4]), *(int(digits[at : at + 2]) for at in (4, 6, 8, 10)))
-    of_day = (hour * 60 + minute) * 60 * NS_PER_S + seconds(f"{digits[12:]}.{parts or 0}")
+    of_day = (hour * 60 + minute) * 60 * NS_PER_S + seconds(f"{digits[12:14]}.{digits[14:] or parts or 0}")
     return _midnight(year, month, day) + of_day
+
+
+def _epoch(match: re.Match[str], _order: Order | None) -> int:
+    """s, ms, µs or ns, as many digits say; eight octets of a message with its check are none."""
+    number = match["since"].replace(",", ".")
+    if len(number) == 16 and number.isdigit() and ends_with_crc16(bytes.fromhex(number)):
+        raise ValueError("octets")
+    return int(Decimal(number) * _epoch_unit(number))
+
+
+def _epoch_unit(number: str) -> int:
+    """ns that a number since the epoch counts."""
+    tens = len(number.partition(".")[0]) - len(str(EPOCH[0]))
+    return int(NS_PER_S // 10**tens)
 
 
 def _named(match: re.Match[str], _order: Order | None) -> int:
@@ -140,24 +165,31 @@ def _clock(pattern: str) -> re.Pattern[str]:
 
 
 CLOCKS: tuple[Clock, ...] = (
-    Clock("date and time", _clock(rf"(?P<date>\d{{1,4}}[-./]\d{{1,2}}[-./]\d{{1,4}})(?:[ T_]|, ?| +){_TIME}"
-                                  r"(?P<zone>Z|[+-]\d\d:?\d\d(?!\d))?"), _dated, dated=True),
-    Clock("day, month by name, year and time", _clock(rf"(?P<day>\d{{1,2}})[- ]{_MONTH}[- ]"
-                                                               rf"(?P<year>\d{{4}})[ ,T:]+{_TIME}"),
+    Clock("date and time", _clock(rf"(?P<date>\d{{1,4}}[-./]\d{{1,2}}[-./]\d{{1,4}})(?:[ T_:-]|, ?| +){_TIME}"
+                                  r"(?P<zone>Z| ?[+-]\d\d:?\d\d(?![\d.]))?"), _dated, dated=True),
+    Clock("day, month by name, year and time", _clock(rf"(?P<day>\d{{1,2}})[-/ ]{_MONTH}[-/ ]"
+                                                               rf"(?P<year>\d{{4}})[ ,T:]+{_TIME}"
+                                                               r"(?P<zone>Z| ?[+-]\d\d:?\d\d(?![\d.]))?"),
           _named_month, dated=True),
     Clock("month by name, day, time and year", _clock(rf"{_MONTH} +(?P<day>\d{{1,2}}),? {_TIME}"
                                                             r"(?: (?P<year>\d{4}))?"),
           _named_month, dated=True),
+    Clock("day in Chinese and time", _clock(r"(?P<year>\d{4})[年년] ?(?P<month>\d{1,2})[月월] ?"
+                                            r"(?P<day>\d{1,2})[日일] *" + _TIME), _named_month, dated=True),
+    Clock("month, day and time", _clock(r"(?P<month>0[1-9]|1[0-2])[-/](?P<day>0[1-9]|[12]\d|3[01])[ T]" + _TIME),
+          _named_month, dated=True, first=True),
     Clock("days and time of day", _clock(rf"(?P<days>\d{{1,4}}):(?=\d\d:){_TIME}"), _days, first=True),
     Clock("time of day", _clock(_TIME), _of_day, daily=True),
     Clock("time of day behind a label", re.compile(
               r"(?<=[G-Zg-z]:)(?P<clock>\d{1,2}:\d{2}:\d{2}[.,]\d{3,6})(?!\d)"), _of_day, daily=True),
     Clock("date and time without signs", _clock(
               r"(?P<packed>(?:19|20)\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])[T_ -]?"
-              r"(?:[01]\d|2[0-3])[0-5]\d[0-5]\d(?:[.,]\d{1,9})?)(?P<zone>Z?)(?![0-9A-Za-z])"), _packed,
+              r"(?:[01]\d|2[0-3])[0-5]\d[0-5]\d(?:[.,]\d{1,9}|\d{3})?)(?P<zone>Z?)(?![0-9A-Za-z])"), _packed,
           dated=True),
     Clock("TAI64N", _clock(r"@(?P<tai>4[0-9a-f]{15})(?P<nano>[0-3][0-9a-f]{7})(?![0-9a-f])"), _tai, dated=True,
           first=True),
+    Clock("since the epoch, alone", re.compile(
+              r"^[\[(<]?(?P<since>1[5-8]\d{8}(?:[.,]\d{1,9}|\d{3}|\d{6}|\d{9}))[\])>:]?$"), _epoch, dated=True),
     Clock("ms since the epoch", _clock(r"(?P<number>1\d{12})(?=[\s:;,\])|])"), _scaled(MS), dated=True, first=True),
     Clock("ns since the epoch, behind", re.compile(r"(?<=\s)(?P<number>1\d{18})$"), _scaled(1), dated=True, unit=1),
     Clock("minutes and seconds", _clock(r"(?P<clock>(?P<m>\d{1,3}):(?P<s>\d{2}\.\d{1,6}))(?![\d:])"),
@@ -247,7 +279,12 @@ def _tick(match: re.Match[str], counted: int = 0) -> int:
         return max(1, counted // int(10 ** len(match["number"].partition(".")[2])))
     if "nano" in found:
         return 1
-    text = found.get("clock") or found.get("dashed") or found.get("packed") or found.get("number") or ""
+    if "since" in found:
+        number = match["since"].replace(",", ".")
+        return max(1, _epoch_unit(number) // int(10 ** len(number.partition(".")[2])))
+    text = (
+        found.get("clock") or found.get("dashed") or _packed_decimals(found.get("packed")) or found.get("number") or ""
+    )
     unit = NS_PER_S
     if "unit_behind" in found:
         unit = _unit(match)
@@ -265,6 +302,12 @@ def _tick(match: re.Match[str], counted: int = 0) -> int:
     _, _, decimals = text.replace(",", ".").partition(".")
     tick: int = unit // 10 ** len(decimals)
     return max(1, tick)
+
+
+def _packed_decimals(packed: str | None) -> str:
+    """A time without signs with a point before the parts of its second."""
+    digits = re.sub(r"[T_ -]", "", packed or "")
+    return f"{digits[:14]}.{digits[14:]}" if digits[14:].isdigit() else digits
 
 
 def midnight(date: str, order: Order | None = None) -> int:

@@ -224,7 +224,10 @@ _COLUMN_BESIDE = re.compile(r"[ \t]*[|;]?[ \t]+(?=[0-9A-Fa-f(\[<{])")
 
 def label_of(lead: str) -> str:
     """What stands before octets, without times; the same for all lines of one sort."""
-    return " ".join(_DIGITS.sub("#", WAYS.sub("~", lead)).replace(STAMP, "").split())
+    return " ".join(_DIGITS.sub("#", WAYS.sub("~", _WEEKDAY.sub("", lead))).replace(STAMP, "").split())
+
+
+_WEEKDAY = re.compile(r"(?<![A-Za-z])(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun)(?:[a-z]{0,6}day)?(?![A-Za-z]),?")
 
 
 def way_of(lead: str) -> str:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import groupby, pairwise
 
 from dissectors.line import MS
 from sniff.formats.dump_rows import SAME_ROWS
@@ -302,6 +302,7 @@ def _roles(lines: Sequence[Line], main: str, directed: set[str]) -> dict[str, Ro
     usual = {line.spelling for line in lines if line.family == main}
     alike = {line.family for line in lines if line.spelling in usual}
     seen: dict[str, list[int]] = {}
+    stretches = Counter(family for family, _ in groupby(line.family for line in lines))
     at = 0
     for line in lines:
         if line.family == main:
@@ -317,7 +318,11 @@ def _roles(lines: Sequence[Line], main: str, directed: set[str]) -> dict[str, Ro
     for family, (many, found, octets) in seen.items():
         if family == "":
             roles[family] = Role.DATA
-        elif found >= _REPEATS * many and (octets >= _TELLING * many or many >= _FIXED_LEAST):  # a few are anywhere
+        elif (
+            found >= _REPEATS * many
+            and (octets >= _TELLING * many or many >= _FIXED_LEAST)  # a few are anywhere
+            and stretches[family] >= min(many, _FIXED_LEAST)  # between the others: a master asks the same for ever
+        ):
             roles[family] = Role.SAME
         elif family in directed or ((main not in directed or (one_way and octets > 4 * many)) and family in alike):
             roles[family] = Role.DATA

@@ -100,6 +100,13 @@ class TableLayout:
             return True
         return row[self.kind].strip().lower() in TYPES_WITH_OCTETS
 
+    def has_time(self, row: Sequence[str]) -> bool:
+        """Whether its time can be read."""
+        try:
+            return abs(self._end(row, 0)) < MOST
+        except ValueError:
+            return False
+
     def chunks(self, row: Sequence[str], char: int) -> Iterator[Chunk]:
         """The octets of a row, at their end, of one direction after the other; `char`: ns of a character, where only
         the begin is told.
@@ -325,6 +332,7 @@ def _column(cells: Sequence[Sequence[str]], many: int, wanted: Callable[[Sequenc
     return None
 
 
+_NEARLY_ALL = 0.9
 _FRACTION = re.compile(r"[+-]?\d+[.,]\d+")
 
 
