@@ -169,7 +169,8 @@ class Assembly:
         if self._goes_on:
             return line.stamp is None and line.bare
         if line.stamp is not None and line.way and self._stamp is not None and line.stamp.tick < COARSE:
-            same = (line.stamp.time, line.way, line.family) == (self._stamp.time, self._way, self._family)
+            before = 0 if self._plan.times.steps else self._stamp.time
+            same = (line.stamp.time, line.way, line.family) == (before, self._way, self._family)
             return same and not ends_with_crc16(bytes(self._held))  # what one read brought in two pieces
         if self._plan.octetwise and len(line.octets) == 1:
             return line.stamp is None and line.way == self._way

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field, replace
 from itertools import groupby, pairwise
 
 from dissectors.line import MS
-from sniff.formats.dump_rows import SAME_ROWS
-from sniff.formats.log_lines import Kind, Line, head_of, line_of, numbers_of
+from sniff.formats.dump_plan import heads_of, offsets_of
+from sniff.formats.log_lines import Kind, Line, line_of, numbers_of
 from sniff.formats.log_margin import NO_MARGIN, Margin, margin_of
 from sniff.formats.log_numbers import base_of
 from sniff.formats.log_octets import PAIRS_ONLY
@@ -39,7 +39,6 @@ _JOINED, _SHORT = "digits without space", 6
 """Digits of the shortest frame, on lines of which longer ones are known."""
 
 _REPEATS = 0.6
-_ROWS_LEAST = 0.7
 _NUMBERED = 0.6
 _MOSTLY = 0.8
 _GROWN = 0.2
@@ -140,7 +139,7 @@ def _plan(texts: Sequence[str]) -> Plan | None:
     base = base_of([numbers_of(text) for text in texts if text.strip()])
     times = order_of(texts)
     lines = [line_of(text, base, times=times) for text in texts]
-    offsets = _offsets(
+    offsets = offsets_of(
         [(line, before) for line, before in zip(lines, ["", *texts], strict=False) if line.kind is Kind.ROW]
     )
     rows = sum(len(line.octets) for line in lines if line.kind is Kind.ROW)
@@ -148,7 +147,7 @@ def _plan(texts: Sequence[str]) -> Plan | None:
     if offsets is not None and rows >= others:
         tools = Counter(line.tool for line in lines if line.tool)
         name = f"hexdump ({tools.most_common(1)[0][0]})" if tools else "hexdump"
-        return Plan(name, base, offsets, times=times, heads=_heads(texts, lines))
+        return Plan(name, base, offsets, times=times, heads=heads_of(texts, lines))
     lines = [line_of(text, base, False, times) for text in texts]
     ahead = _times_ahead(texts, lines, times)
     if ahead.unit:
@@ -171,25 +170,6 @@ def _is_of_adapter(line: Line) -> bool:
     return line.tool == "usbmon" and line.way == "Bi" and line.octets != b""
 
 
-def _heads(texts: Sequence[str], lines: Sequence[Line]) -> frozenset[str]:
-    """The heads whose rows repeat those of one of the two blocks before, nearly always."""
-    blocks: list[tuple[str, bytearray]] = []
-    head, is_row = "", False
-    for text, line in zip(texts, lines, strict=True):
-        if line.kind is Kind.ROW and is_row and line.offset.strip("0"):
-            blocks[-1][1].extend(line.octets)
-        elif line.kind is Kind.ROW:
-            blocks.append((head, bytearray(line.octets)))
-        elif line.kind is not Kind.EMPTY:
-            head = head_of(text)
-        is_row = line.kind is Kind.ROW
-    many, repeated = Counter(name for name, _ in blocks), Counter[str]()
-    for at, (name, octets) in enumerate(blocks):
-        before = [told for other, told in blocks[max(0, at - 2) : at] if other != name]
-        repeated[name] += len(octets) >= _TELLING and any(octets in told for told in before)
-    return frozenset(name for name in many if many[name] >= 2 and repeated[name] >= _REPEATS * many[name])
-
-
 def _times_ahead(texts: Sequence[str], lines: Sequence[Line], times: Times) -> Times:
     """The times with those that numbers ahead of the lines tell, where hardly a line has another."""
     told = [(text, line) for text, line in zip(texts, lines, strict=True) if line.kind is Kind.OCTETS]
@@ -210,8 +190,9 @@ def _steps(lines: Sequence[Line], times: Times) -> Times:
         return replace(times, clocks_only=True)  # how long an answer took, beside answers
     if len(stamps) < _FIXED_LEAST:
         return times
-    back = sum(later.time < earlier.time for earlier, later in pairwise(stamps)) > _BACK * len(stamps)
-    passed = sum(stamp.time for stamp in stamps) if back else stamps[-1].time - stamps[0].time
+    changes = [later.time - earlier.time for earlier, later in pairwise(stamps) if later.time != earlier.time]
+    back = sum(change < 0 for change in changes) > _BACK * len(changes)
+    passed = sum(stamp.time for stamp in stamps[1:]) if back else stamps[-1].time - stamps[0].time
     if 4 * passed < FASTEST * sum(len(line.octets) for line in told[1:]):
         return replace(times, clocks_only=True)  # how long a call took: octets take their time on the line
     return replace(times, steps=True) if back else times
@@ -352,24 +333,6 @@ def _are_at_once(before: Line, line: Line) -> bool:
     if told is None or stamp is None or stamp.tick > MS:
         return False
     return abs(stamp.time - told.time) < FASTEST * len(line.octets)
-
-
-def _offsets(rows: Sequence[tuple[Line, str]]) -> int | None:
-    """The base in which offsets of rows, each with the line before it, fit to what the rows hold; None when they do
-    not."""
-    for base in (16, 8, 10):
-        fitting = expected = 0
-        for row, before in rows:
-            try:
-                offset = int(row.offset, base)
-            except ValueError:
-                continue
-            is_behind_same = before.strip() == SAME_ROWS and offset > expected
-            fitting += offset in (0, expected) or (not row.octets and offset <= expected) or is_behind_same
-            expected = offset + len(row.octets)
-        if rows and fitting >= _ROWS_LEAST * len(rows):
-            return base
-    return None
 
 
 def _width(data: Sequence[Line]) -> int | None:

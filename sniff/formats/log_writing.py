@@ -218,7 +218,9 @@ def _escapes_of(texts: Sequence[str]) -> Escapes:
         return Escapes.HEX
     found = [match[1] for text in texts if "\\" in text for match in _BEHIND_SLASH.finditer(text)]
     digits = [one for one in found if one.isdigit()]
-    is_decimal = any("8" in one or "9" in one or (len(one) == 3 and one > "377") for one in digits)
+    if any(int(one) > 255 and not set("89") & set(one) for one in digits):
+        return Escapes.USUAL  # \377 is no decimal octet; \08 is a zero, and an 8
+    is_decimal = any("8" in one or "9" in one for one in digits)
     return Escapes.DECIMAL if is_decimal and "x" not in found else Escapes.USUAL
 
 

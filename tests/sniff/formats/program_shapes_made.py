@@ -303,3 +303,8 @@ add(
     exp=b"".join(f[:16] for f in FR),
     whole=False,
 )
+add(
+    "octal-before-an-8",
+    lines(lambda i, f: f'{clock(i)} {way(i)} "\\0' + "8" + shown(f, "\\{0:03o}", QUOTED) + '\\377"'),
+    exp=b"".join(b"\0" + b"8" + f + b"\xff" for f in FR),
+)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dates
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -103,3 +104,14 @@ def test_eight_octets_in_decimal_digits_are_no_time(tmp_path: Path) -> None:
     path.write_text("1703000100101730\n170304000100025DF3\n" * 3)
     octets = b"".join(item.octets for item in read(path).items() if isinstance(item, Chunk))
     assert octets == bytes.fromhex("1703000100101730170304000100025DF3") * 3
+
+
+def test_steps_of_which_many_are_alike(tmp_path: Path) -> None:
+    """As `strace -r` writes them, of a bus that polls evenly: the same step twice is no time twice."""
+    path = tmp_path / "x.log"
+    steps = [0.0, 0.003125, 0.003125, 0.007031, *[0.036084] * 16, 0.003125, *[0.036084] * 8, 0.012, 0.012]
+    path.write_text("".join(f"{step:13.6f} RX {hx(POLL[number % 2])}\n" for number, step in enumerate(steps)))
+    times = [item.time for item in read(path).items() if isinstance(item, Chunk)]
+    assert [round((after - before) / 1000) for before, after in pairwise(times)] == [
+        round(step * 1e6) for step in steps[1:]
+    ]
