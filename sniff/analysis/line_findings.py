@@ -11,7 +11,7 @@ from typing import NamedTuple
 from dissectors.chances import is_rare
 from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, found, times
 from dissectors.frame import Chunk, Damage, Event, Flaw, Frame, LineError, Noise, Place, Reason, Role
-from dissectors.line import MS, NS_PER_S, LineSettings
+from dissectors.line import MS, LineSettings
 from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction
 from dissectors.words import milliseconds, percent
@@ -21,6 +21,7 @@ from sniff.analysis.judgement import Heard, Judgement
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.line_use import LineUse
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, lacking_bits, what_fits
+from sniff.analysis.port_presence import PortPresence
 from sniff.analysis.remains import Remains
 from sniff.analysis.sender_findings import BUS, MASTER, MOST_SENDERS, WRONG, Senders
 from sniff.analysis.stray_findings import strays_found
@@ -86,10 +87,8 @@ class LineFindings:
         self._first = self._now = session.started  # of a capture in which nothing was heard: when it began
         self._damaged = self._damaged_here = 0  # rows that are no good frame, and those of them with an overrun
         self._overruns, self._lost = Tally(), Tally()
-        self._unplugged, self._stepped = Tally(), Tally()
+        self._stepped, self._port = Tally(), PortPresence(session.started)
         self._counted: dict[str, Tally] = {}
-        self._unplugged_at: int | None = None
-        self._away = 0
         self._lost_octets = self._only_heard = 0
         self._is_lost_counted = True
         self._echoes = EchoesHeard(session.timing.latency)
@@ -159,12 +158,8 @@ class LineFindings:
             self._lost.add(event.time)
             self._lost_octets += max(0, event.count)
             self._is_lost_counted = self._is_lost_counted and event.count >= 0
-        elif kind is LineEventKind.UNPLUGGED:
-            self._unplugged.add(event.time)
-            self._unplugged_at = event.time
-        elif kind is LineEventKind.REPLUGGED and self._unplugged_at is not None:
-            self._away += max(0, event.time - self._unplugged_at)
-            self._unplugged_at = None
+        elif kind in (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED):
+            self._port.add(event, self._rows > 0)
         elif kind is LineEventKind.CLOCK:
             self._stepped.add(event.time)
         elif kind is LineEventKind.ERRORS and (event.text in self._counted or len(self._counted) < 16):
@@ -283,7 +278,7 @@ class LineFindings:
 
     def lasting_silence(self, now: int) -> Finding | None:
         """That a bus which is listened to has fallen silent by `now` (ns); None where nobody can say so."""
-        is_timed = self._session.has_times and self._unplugged_at is None and not self.heard.is_rubbish
+        is_timed = self._session.has_times and self._port.away_since is None and not self.heard.is_rubbish
         return self._patterns.lasting_silence(now) if is_timed else None
 
     def judgement(self) -> Judgement:
@@ -331,13 +326,7 @@ class LineFindings:
             many = counted(self._lost_octets, "octet") if self._lost_octets else "an unknown number of octets"
             many = many if self._is_lost_counted or not self._lost_octets else f"at least {many}"
             yield self._lost.found(RULES["LN005"], "adapter", f"{many} lost {times(self._lost.count)}")
-        if self._unplugged.count:
-            words = f"unplugged {times(self._unplugged.count)}"
-            words += f", away for {self._away / NS_PER_S:.1f} s in all" if self._away else ""
-            words += "; it did not come back" if self._unplugged_at is not None else ""
-            is_away = self._unplugged_at is not None
-            finding = self._unplugged.found(RULES["LN006"], "adapter", words, Severity.ERROR if is_away else None)
-            yield replace(finding, lasts=is_away)
+        yield from self._port.findings()
         if self._stepped.count:
             yield self._stepped.found(RULES["LN007"], "adapter", f"the clock stepped {times(self._stepped.count)}")
         if self._overruns.count:

@@ -98,8 +98,8 @@ _ALL = (
         "LN006",
         Severity.WARNING,
         "adapter unplugged",
-        "The serial adapter went away and, mostly, came back.",
-        "a loose plug, a hub without enough power, or disturbance on the USB cable",
+        "The serial adapter went away and, mostly, came back; or it was not there when the capture began.",
+        "a loose plug, a hub without enough power, disturbance on the USB cable, or another name of the port",
         "another cable or port, a powered hub, an isolated adapter",
     ),
     Rule(
