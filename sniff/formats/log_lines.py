@@ -259,10 +259,10 @@ _HEX = frozenset("0123456789ABCDEFabcdef")
 _JOINED = re.compile(r"(?:^|[\s:>=\]])(?=[0-9A-Za-z?]*[0-9A-Fa-f]{4})(?=(?:[A-Za-z?]*\d){4})([0-9A-Za-z?]{10,})\s*$")
 
 
-def without_stamps(text: str, times: Times = AS_WRITTEN) -> tuple[Stamp | None, str]:
-    """The first time of a line, None without one; and the line with STAMP where times were."""
+def without_stamps(text: str, times: Times = AS_WRITTEN, most: int = MOST_STAMPS) -> tuple[Stamp | None, str]:
+    """The first time of a line, None without one; and the line with STAMP where times were, `most` of them."""
     first: Stamp | None = None
-    for _ in range(MOST_STAMPS):
+    for _ in range(most):
         stamp = stamp_of(text, times)
         if stamp is None:
             break

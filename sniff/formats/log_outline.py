@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from sniff.formats.log_clock import Stamp
 from sniff.formats.log_lines import Kind, Line, label_of, way_of, without_stamps
 from sniff.formats.log_octets import octets_in
 from sniff.formats.log_pieces import LONGEST, SPACES
@@ -24,7 +25,7 @@ _CHARACTERS = "\1"
 """Stands in an outline where the octets stood as characters."""
 
 _SHORT = {
-    "pairs": re.compile(rf"(?<![0-9A-Za-z_.]){H2}(?: {H2}){{0,2}}(?![0-9A-Za-z_])"),
+    "pairs": re.compile(rf"(?<![0-9A-Za-z_.]){H2}(?:[ :.-]{H2}){{0,2}}(?![0-9A-Za-z_])"),
     "digits without space": re.compile(rf"(?<![0-9A-Za-z_])(?:{H2}){{1,5}}(?![0-9A-Za-z_])"),
     "0x and digits": re.compile(r"(?<![0-9A-Za-z_])0[xX][0-9A-Fa-f]{1,2}(?![0-9A-Za-z_])"),
     "pairs in brackets": re.compile(rf"\[{H2}\]|<{H2}>|\({H2}\)|\{{{H2}\}}"),
@@ -61,7 +62,19 @@ def outlines_of(texts: Iterable[str], base: int, times: Times) -> frozenset[Outl
 
 def short_line(text: str, base: int, times: Times, outlines: frozenset[Outline]) -> Line | None:
     """A line with few octets that has one of these outlines; None where it has none."""
-    stamp, text = without_stamps(_plain(text), times)
+    text = _plain(text)
+    stamp, without = without_stamps(text, times)
+    found = _short_line(stamp, without, outlines)
+    if found is None and without.count(STAMP) > 1:  # 01:03:02 may be octets, and no second time
+        found = _short_line(*without_stamps(text, times, 1), outlines)
+    comma = text.find(",", stamp.begin, stamp.end) if stamp is not None else -1
+    if found is None and comma >= 0:  # what stands behind may be octets, and no parts of a second
+        stamp, lead = without_stamps(text[:comma], times)
+        found = _short_line(stamp, lead + text[comma:], outlines)
+    return found
+
+
+def _short_line(stamp: Stamp | None, text: str, outlines: frozenset[Outline]) -> Line | None:
     for spelling in sorted({outline.spelling for outline in outlines}):
         for match in _short(spelling).finditer(text):
             octets = _octets(match[0], spelling)

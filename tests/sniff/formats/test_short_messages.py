@@ -12,7 +12,7 @@ from dissectors.frame import Chunk
 from sniff.formats import read
 
 FIELD = [bytes.fromhex(digits) for digits in (
-    "DC0101", "DC0102", "6805058F82025A046D16", "E5", "10030249 4E16", "E5", "DC0201", "6807070381463A3E0200 4416",
+    "DC0101", "DC0102", "6805058F82025A046D16", "E5", "10030249 4E16", "E5", "010302", "DC0201", "6807070381463A3E0200 4416",
     "6805058103083D3E0716", "E5", "DC0102", "DC0201", "1002015D6016", "E5",
 )]  # fmt: skip
 """Tokens and short acknowledges of PROFIBUS."""
@@ -52,6 +52,7 @@ KINDS: dict[str, Written] = {
     "head and dump": lambda i, o: f"[14/03/2026 10:00:{i:02d}] Read data (COM3)\n{dump(o)}",
     "packed time": lambda i, o: f"<202603141000{i:02d}.512 {way(i)}>\n{hx(o)}\n",
     "digits behind a comma": lambda i, o: f"2026/03/14 10:00:{i:02d},{o.hex().upper()}\n",
+    "colons": lambda i, o: f"[10:00:{i:02d}.512][D][uart_debug:114]: {'>>>' if i % 2 else '<<<'} {hx(o, ':')}\n",
     "decimals": lambda i, o: f"[10:00:{i:02d}][D][uart:1]: {'>>>' if i % 2 else '<<<'} {hx(o, ',', '{}')}\n",
     "decimals on lines": lambda i, o: f'{{"t": {i}, "data": [\n' + ",\n".join(f" {octet}" for octet in o) + "\n]}\n",
 }  # fmt: skip
