@@ -71,6 +71,8 @@ class BulkEngine:
         self._session = session
         self._leg = _Leg(registry.get(session.protocol), session.timing, 1, 0)
         self._reference = SessionEngine(session) if session.unknown else None
+        self._latest = -FAR  # time of the newest read
+        self._is_aside = False  # the reference reads times that run backwards, until they do so no more
 
     @property
     def session(self) -> Session:
@@ -79,26 +81,29 @@ class BulkEngine:
 
     def take_some(self, block: Block) -> list[Output | Table]:
         """Take reads that follow; few rows, which cost dearly as a table, one by one."""
-        if self._reference is None and _is_sane(block):
+        if self._reference is None and self._is_forward(block):
+            self._latest = block.latest
             return self._leg.take_some(block)
         table = self.take(block)
         return [table] if table else []
 
     def take(self, item: Block | LineEvent) -> Table:
         """Take what follows."""
+        if self._reference is None and isinstance(item, Block) and not self._is_forward(item):
+            self._step_aside()
+        if isinstance(item, Block):
+            self._latest = max(self._latest, int(item.reads.times.max()))
         reference = self._reference
         if reference is not None:
             items = item.chunks() if isinstance(item, Block) else (item,)
             was_searching = reference.searching
             table = _of_outputs(reference, [reference.take(one) for one in items])
-            if was_searching and not reference.searching:
+            if self._is_aside:
+                self._come_back(reference, item)
+            elif was_searching and not reference.searching:
                 self._go_on(reference)
             return table
-        if not isinstance(item, Block):
-            return self._happen(item)
-        if not _is_sane(item):
-            return self._one_by_one(item)
-        return self._leg.take(item)
+        return self._leg.take(item) if isinstance(item, Block) else self._happen(item)
 
     def advance(self, now: int) -> list[Output | Table]:
         """Say that no read returned up to `now` (ns)."""
@@ -141,31 +146,48 @@ class BulkEngine:
         self._reference.take(event)
         return table
 
-    def _one_by_one(self, block: Block) -> Table:
-        """Times at the ends of what can be said in 64 bits, which only a damaged file or an evil one has."""
-        table, leg = self._restart(), self._leg
-        self._reference = SessionEngine(self._session, first=leg.next, before_tx=leg.last_tx)
-        return joined(leg.dissector.name, leg.next, [one for one in (table, self.take(block)) if one])
+    def _is_forward(self, block: Block) -> bool:
+        """Whether times do not run backwards, nor to the ends of what can be said in 64 bits: only so do reads, as
+        columns, tell what they tell one by one."""
+        times = block.reads.times
+        return self._latest <= int(times[0]) and block.latest <= FAR and bool((times[1:] >= times[:-1]).all())
+
+    def _step_aside(self) -> None:
+        """Let the reference go on with all that is known."""
+        self._reference = SessionEngine(self._session, first=self._leg.next, before_tx=self._leg.last_tx)
+        self._reference.engine = self._leg.one_by_one()
+        self._is_aside = True
+
+    def _come_back(self, reference: SessionEngine, item: Block | LineEvent) -> None:
+        """Go on in columns where all reads that are still known came in order and after all before them."""
+        if isinstance(item, Block):
+            if item.latest == self._latest:
+                self._go_on(reference)
+                self._is_aside = self._reference is not None
+        elif item.kind.is_hole:
+            self._latest = -FAR  # what was before it is nothing to who begins anew
+        elif settings_change(item) is not None:  # rare: from here on one by one
+            self._is_aside = False
 
     def _go_on(self, reference: SessionEngine) -> None:
-        """A search is over: from here on many rows at once again, where all that is known can be handed over."""
+        """From here on many rows at once again, where all that is known can be handed over."""
         leg = _Leg.after(reference.engine)
         if leg is not None and leg.timing == reference.session.timing:
             self._session, self._leg, self._reference = reference.session, leg, None
 
     def _restart(self) -> Table:
         table, before = self._leg.close(), self._leg
+        self._latest = -FAR
         self._leg = _Leg(before.dissector, before.timing, before.next, before.last_tx)
         return table
 
 
-def _is_sane(block: Block) -> bool:
-    return int(block.reads.times.min()) >= -FAR and int(block.reads.times.max()) <= FAR
-
-
 def _of_outputs(engine: SessionEngine, outputs: list[Output]) -> Table:
+    """As a table; what a change of the settings completes was heard before it, and is of the protocol of then."""
     first = next((output.rows[0].no for output in outputs if output.rows), engine.engine.next)
-    return Table.of_outputs(engine.dissector.name, first, outputs)
+    frames = (row.event for output in outputs for row in output.rows if isinstance(row.event, Frame))
+    spoken = next((frame.protocol for frame in frames), engine.dissector.name)
+    return Table.of_outputs(spoken, first, outputs)
 
 
 class _Leg:
@@ -194,6 +216,14 @@ class _Leg:
         leg._late = LateColumns.after(engine.late, engine.timing)
         leg._tracker = engine.tracker
         return leg
+
+    def one_by_one(self) -> Engine:
+        """The engine that goes on from here with reads one by one."""
+        engine = Engine(self.dissector, self.timing, self.next, self._before_tx)
+        engine.last_tx = self.last_tx
+        engine.framer, engine.held = self._framing.framer, self._framing.held
+        engine.late, engine.tracker = self._late.one_by_one(self.timing), self._tracker
+        return engine
 
     def take_some(self, block: Block) -> list[Output | Table]:
         """Take reads; few rows that the reference has read come one by one."""

@@ -75,6 +75,16 @@ class BulkFraming:
         self._base = 0  # octets of the stream before the block at work
         self._before = before  # nominal end of the newest octet
 
+    @property
+    def framer(self) -> Framer:
+        """The reference framer, which has read all that came."""
+        return self._framer
+
+    @property
+    def held(self) -> int:
+        """Octets that are in no row yet."""
+        return self._base - self._given
+
     def take(self, block: Block) -> list[Stretch]:
         """Take the reads that follow; give the rows that are certain by now."""
         if self._dissector.kernel is None or len(block.reads.octets) < LEAST:

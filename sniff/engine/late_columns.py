@@ -43,6 +43,15 @@ class LateColumns:
         columns._is_late = np.array([read.is_late for read in kept], bool)
         return columns
 
+    def one_by_one(self, timing: Timing) -> LateReads:
+        """What goes on from here where reads are seen one by one."""
+        later = LateReads(timing)
+        later.backlog = self._backlog
+        columns = (self._starts, self._times, self._pauses, self._latencies, self._is_late)
+        kept = zip(*(column[-KEPT:].tolist() for column in columns), strict=True)
+        later.go_on(kept, self._latency, self._seen, self._before_run)
+        return later
+
     def see(self, reads: Reads) -> None:
         """Take the reads that follow."""
         times, lasted = reads.times, reads.lengths * self._char

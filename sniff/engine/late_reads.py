@@ -13,6 +13,7 @@ frame has the slack that they prove. So a live bus follows what comes; a saved o
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import replace
 
 from dissectors.frame import Chunk, Frame
@@ -67,6 +68,15 @@ class LateReads:
         self._before: int | None = None
         self.before_run = 0
         self.kept: deque[_Read] = deque(maxlen=KEPT)
+
+    def go_on(self, kept: Iterable[tuple[int, int, int, int, bool]], latency: int, seen: int, before_run: int) -> None:
+        """Go on where reads were seen many at a time: `kept`, the last of them, as `_Read` has them."""
+        for start, time, pause, slow, is_late in kept:
+            read = _Read(start, time, pause, slow)
+            read.is_late = is_late
+            self.kept.append(read)
+            self._before = time
+        self.latency, self.seen, self.before_run = latency, seen, before_run
 
     def see(self, chunk: Chunk) -> None:
         """Take the next read."""
