@@ -102,6 +102,10 @@ class Meant(Generic[Kept]):
 
     def add(self, output: Output) -> None:
         """Take rows and the exchanges that closed with them."""
+        for one in output.one_by_one():
+            self._take_one(one)
+
+    def _take_one(self, output: Output) -> None:
         self._open.update((row.no, row) for row in output.rows if row.placement is not None)
         self._reader.remember(output)
         for transaction in output.transactions:

@@ -80,10 +80,12 @@ def settled(
     settling = VerdictJoin(points, wanted)
     try:
         for output in proving(outputs(items, session), proof):
-            if isinstance(output, Output):
+            if not isinstance(output, Output):
+                continue
+            for one in (output,) if points is None else output.one_by_one():
                 if points is not None:
-                    points.remember(output)
-                yield from settling.add(output)
+                    points.remember(one)
+                yield from settling.add(one)
     except CaptureError:
         yield from settling.flush()
         raise

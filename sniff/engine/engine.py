@@ -60,6 +60,11 @@ class Output:
         if at < len(self.transactions):
             yield None, self.transactions[at:]
 
+    def one_by_one(self) -> Iterator[Output]:
+        """The same in steps of a row each: of many exchanges in one read each is over before the next one is asked."""
+        for row, closed in self.in_order():
+            yield Output(() if row is None else (row,), closed)
+
 
 NOTHING = Output()
 
