@@ -24,7 +24,9 @@ Keys = npt.NDArray[np.uint64]
 MOST_FRAMES = 200_000
 MOST_EVENTS = 1000
 _RECENT = 64
-"""Rows within which exchanges close."""
+"""Rows within which a request is answered, and an answered one closes: what takes longer is not kept, however many
+rows come at a time."""
+_KEPT = 2 * _RECENT
 
 _REQUEST, _RESPONSE = ROLES.index(Role.REQUEST), ROLES.index(Role.RESPONSE)
 _ANSWERED = VERDICTS.index(Verdict.ANSWERED)
@@ -96,6 +98,9 @@ class SiteEar:
         told = table.heard & table.good & table.is_frame & (lengths > 0) & (lengths <= LONGEST)
         told &= (role == _REQUEST) | (role == _RESPONSE)
         places = np.flatnonzero(told)
+        if len(places) > MOST_FRAMES - self._frames:  # as far as if its rows came one by one
+            self.add_table(table.part(0, int(places[MOST_FRAMES - self._frames - 1]) + 1))
+            return
         self._frames += len(places)
         if len(places):
             octets, edges = gathered(table.octets, frames.offset[places], lengths[places])
@@ -111,6 +116,7 @@ class SiteEar:
         for place, want in zip(requests.tolist(), wanted.tolist(), strict=True):
             self._open[table.first + place] = (int(frames.start[place]), int(frames.end[place]), want)
         good = (closed.verdict == _ANSWERED) & (closed.request != NONE) & (closed.response != NONE)
+        good &= closed.response - closed.request <= _RECENT
         rows = []
         for place in np.flatnonzero(good).tolist():
             asked = self._open.get(int(closed.request[place]))
@@ -135,13 +141,13 @@ class SiteEar:
 
     def _keep_recent(self, table: Table) -> None:
         """Keep of a table, and of those before it, what exchanges may close with that have not."""
-        frames, begin = table.frames, max(0, len(table) - _RECENT)
+        frames, begin = table.frames, max(0, len(table) - _KEPT)
         ends = zip(frames.start[begin:].tolist(), frames.end[begin:].tolist(), strict=True)
         self._rows.update(enumerate(ends, table.first + begin))
-        least = table.first + len(table) - _RECENT
-        if len(self._rows) > 2 * _RECENT:
+        least = table.first + len(table) - _KEPT
+        if len(self._rows) > 2 * _KEPT:
             self._rows = {row: one for row, one in self._rows.items() if row >= least}
-        if len(self._open) > _RECENT:
+        if len(self._open) > _KEPT:
             self._open = {row: one for row, one in self._open.items() if row >= least}
 
     def heard(self) -> HeardFrames:

@@ -9,10 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from dissectors.columns import Times
 from dissectors.findings import Finding, Severity
 from dissectors.frame import Chunk
 from dissectors.line import MS
 from dissectors.modbus.envelope import seal_rtu
+from sniff.analysis import site_ear
 from sniff.analysis.site_ear import MOST_FRAMES, SiteEar
 from sniff.analysis.site_findings import SiteJudgement, judged
 from sniff.analysis.site_rules import SITE_RULES
@@ -117,6 +119,25 @@ def test_little_is_kept_of_a_long_capture() -> None:
     session = sessions(made)[0]
     survey(Given(made["near"]), session, ear)
     assert len(ear.heard()) == 0
+
+
+def test_as_much_is_kept_of_tables_as_of_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = SITES["line-twice"][0](random.Random(1))
+    session, some = sessions(made)[0], made["near"][:200]
+    for most, recent in ((50, 64), (200_000, 1)):
+        monkeypatch.setattr(site_ear, "MOST_FRAMES", most)
+        monkeypatch.setattr(site_ear, "_RECENT", recent)
+        by_tables, by_rows = SiteEar(), SiteEar()
+        survey(Given(some), session, by_tables)
+        survey(Given(some), session, by_rows, reference=True)
+        assert len(by_rows.heard()) <= most
+        for one, other in zip(_kept(by_tables), _kept(by_rows), strict=True):
+            assert one.tolist() == other.tolist()
+
+
+def _kept(ear: SiteEar) -> list[Times]:
+    heard, exchanges = ear.heard(), ear.exchanges()
+    return [heard.start, heard.end, exchanges.asked, exchanges.answered]
 
 
 def test_an_exchange_that_closes_after_its_answer_came_is_one() -> None:
