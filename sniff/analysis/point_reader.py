@@ -24,7 +24,7 @@ MOST_OPEN = 20_000
 """Frames remembered while their transaction is open."""
 
 MOST_ASKED = 512
-"""Requests remembered after their transaction closed, for answers that come late."""
+"""Requests remembered after their transaction closed, for answers that come late; tokens are none."""
 
 ALL = "all"
 """Name of the device that a broadcast is for."""
@@ -129,7 +129,7 @@ class PointReader:
         """The frames of a transaction that tells something."""
         request = self._take(transaction.request)
         response = self._take(transaction.response)
-        if request is not None:
+        if request is not None and not transaction.is_passing:  # who passes the right to send on asks for nothing
             self.ask(transaction.id, request)
         verdict = transaction.verdict
         if verdict is Verdict.LATE and transaction.of is not None:

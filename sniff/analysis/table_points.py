@@ -16,7 +16,7 @@ from dissectors.columns import NONE, VERDICTS, Masks, Numbers, Times
 from dissectors.frame import Frame
 from dissectors.reading_columns import HOWS, ReadingColumns
 from dissectors.readings import Origin
-from dissectors.tracker import Verdict
+from dissectors.tracker import PASSING, Verdict
 from sniff.analysis.point_columns import PlainSamples, TableSamples, no_samples
 from sniff.analysis.point_reader import ALONE, MOST_ASKED, MOST_OPEN, WHOLE, Remembered, Sample, ValuedExchange
 from sniff.engine.table import Table, rows_at
@@ -137,7 +137,8 @@ class _Work:
     def _others(self, places: Times, late: Masks) -> list[tuple[int, Sample]]:
         """What the transactions at these places tell, and whatever may be asked for later."""
         reader, closed = self._reader, self._table.transactions
-        asked = np.flatnonzero(self._request.there)
+        asks = np.array([name not in PASSING for name in closed.names], bool)
+        asked = np.flatnonzero(self._request.there & asks[closed.kind])
         begin, found = 0, []
         exchanges: list[tuple[int, ValuedExchange]] = []
         lates = set(places[late[places]].tolist())

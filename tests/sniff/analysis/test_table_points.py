@@ -14,15 +14,18 @@ from dissectors.modbus.envelope import make_rtu
 from dissectors.modbus.reading_columns import reading_columns
 from dissectors.modbus.readings import readings
 from dissectors.reading_columns import HOWS
+from sniff.analysis import point_reader, table_points
 from sniff.analysis.point_columns import TableSamples, add_to
 from sniff.analysis.point_reader import PointReader, Sample
 from sniff.analysis.points import PointTable
 from sniff.analysis.table_points import samples_of
+from sniff.bus.model import BusModel
 from sniff.bus.offline import outputs
 from sniff.engine.blocks import blocks_of
 from sniff.engine.bulk import tables
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.observer import observe, observe_tables
 from sniff.engine.session import Item, LineEvent
 from sniff.formats import read
 
@@ -105,3 +108,19 @@ def _columns(offset: int, octets: bytes) -> FrameColumns:
         place, length, nothing, nothing, code, code, code, number, small, small, code, names, small, number, number,
         truth, names,
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("most", [2, 512])
+def test_tokens_take_no_place_of_requests_that_late_answers_are_for(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in (point_reader, table_points):
+        monkeypatch.setattr(module, "MOST_ASKED", most)
+    path = FOLDER / "findings" / "ms-tp-master-does-not-wait-for-answers.cap.txt"
+    session, items = read(path).session, list(read(path).items())
+    by_rows, by_tables = BusModel(session, dissector_for(session)), BusModel(session, dissector_for(session))
+    observe(outputs(items, session), by_rows)
+    observe_tables(tables(blocks_of(items), session), by_tables)
+    points = PointTable()
+    for some in of_tables(path, 100_000):
+        add_to(points, some)
+    assert list(points) == list(by_tables.points) == list(by_rows.points)
+    assert sum(point.count for point in points) == 11
