@@ -20,7 +20,7 @@ class Form(Enum):
     DECIMAL = "decimal", "FFFF"
     HEX = "four hexadecimal digits", "FFFF"
     INSTANCE = "number of a BACnet object, decimal; never all ones, which may be a word", "003FFFFF"
-    REAL = "IEEE 754, finite, seven significant digits", "FFFFFFFF"
+    REAL = "IEEE 754, finite, as `single_reals` writes it", "FFFFFFFF"
 
     @property
     def mask(self) -> bytes:

@@ -20,11 +20,12 @@ from dissectors.bacnet.apdu import SEGMENTED, PduType
 from dissectors.bacnet.frame_types import HEADER, FrameType
 from dissectors.bacnet.readings import READ_PROPERTY, TELLING, WRITE_PROPERTY, told
 from dissectors.bacnet.tags import BOOLEAN
-from dissectors.bacnet.values import NUMBER_OF, UNSPECIFIED_INSTANCE, shortest
+from dissectors.bacnet.values import NUMBER_OF, UNSPECIFIED_INSTANCE
 from dissectors.columns import CHECKS, FrameColumns, Masks, Octets, Times
 from dissectors.frame import Check, FoundBy, Frame
 from dissectors.reading_columns import HOWS, Floats, ReadingColumns, ToldValues
 from dissectors.readings import Origin, Reading
+from dissectors.single_reals import shortest
 
 _DESTINATION, _SOURCE, _CRC = 3, 4, 2
 _PLAIN_TYPES = (FrameType.DATA_EXPECTING_REPLY, FrameType.DATA_NOT_EXPECTING_REPLY)

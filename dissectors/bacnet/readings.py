@@ -14,9 +14,10 @@ from dissectors.bacnet.dates import Date, Time
 from dissectors.bacnet.fixed_units import unit_held
 from dissectors.bacnet.frame_types import HEADER
 from dissectors.bacnet.message import Message
-from dissectors.bacnet.values import BitString, ConstructedValue, Double, Enumerated, ObjectId, shortest, show
+from dissectors.bacnet.values import BitString, ConstructedValue, Double, Enumerated, ObjectId, show
 from dissectors.frame import Frame
 from dissectors.readings import Origin, Reading
+from dissectors.single_reals import shortest
 
 PRESENT_VALUE = 85
 READ_PROPERTY, _READ_MULTIPLE, WRITE_PROPERTY, _WRITE_MULTIPLE = 12, 14, 15, 16

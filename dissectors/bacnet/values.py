@@ -17,6 +17,7 @@ from dissectors.bacnet.dates import Date, Time, week_and_day
 from dissectors.bacnet.fixed_units import ENDLESS, OF_PARAMETERS, unit_held
 from dissectors.bacnet.station_address import mac_text
 from dissectors.bacnet.tags import Tag
+from dissectors.single_reals import shortest_text
 
 APPLICATION = (
     "Null",
@@ -304,7 +305,7 @@ def show(value: Any, depth: int = 0) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
-        return repr(shortest(value) if type(value) is float else float(value)).removesuffix(".0")
+        return shortest_text(value) if type(value) is float else repr(float(value)).removesuffix(".0")
     if isinstance(value, bytes):
         return value.hex() if len(value) <= 32 else f"{value[:32].hex()}… ({len(value)} octets)"
     if isinstance(value, str):
@@ -319,18 +320,6 @@ def show(value: Any, depth: int = 0) -> str:
     if isinstance(value, Tag):
         return show_tag(value)
     return str(value)
-
-
-def shortest(value: float) -> float:
-    """The shortest decimal that means the same single: 59.9 and not 59.9000015."""
-    for digits in (6, 7, 8, 9):
-        rounded = float(f"{value:.{digits}g}")
-        try:
-            if struct.pack(">f", rounded) == struct.pack(">f", value):
-                return rounded
-        except OverflowError:
-            break
-    return value
 
 
 def show_part(name: str, value: Any, depth: int = 0) -> str:

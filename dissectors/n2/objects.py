@@ -13,6 +13,8 @@ import struct
 from dataclasses import dataclass
 from enum import Enum
 
+from dissectors.single_reals import shortest
+
 
 class Encoding(Enum):
     """How a value is written; the value of the member is its length in characters."""
@@ -150,22 +152,8 @@ def decode(characters: str, encoding: Encoding, *, signed: bool = False) -> int 
         return None
     octets = bytes.fromhex(characters)
     if encoding is Encoding.FLOAT:
-        return _shortest(octets)
+        return shortest(struct.unpack(">f", octets)[0])
     return int.from_bytes(octets, "big", signed=signed and encoding is Encoding.INTEGER)
-
-
-def _shortest(octets: bytes) -> float:
-    value: float = struct.unpack(">f", octets)[0]
-    if not math.isfinite(value):
-        return value
-    for digits in (6, 7, 8):
-        rounded = float(f"{value:.{digits}g}")
-        if abs(rounded) <= _SINGLE_MAX and struct.pack(">f", rounded) == octets:
-            return rounded
-    return float(f"{value:.9g}")
-
-
-_SINGLE_MAX = 3.4028234663852886e38
 
 
 def encode(value: float, encoding: Encoding) -> str:

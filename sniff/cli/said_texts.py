@@ -9,6 +9,7 @@ import numpy as np
 
 from dissectors.columns import Masks, Octets, Times
 from dissectors.manifest import Dissector
+from dissectors.single_reals import shortest_text
 from dissectors.stencil import Form, Stencil
 from sniff.analysis.wording import describe, is_error
 from sniff.cli.byte_columns import Bytes, Chosen, Column, digits, hex_words, matrix, short_numbers, side_by_side, width
@@ -113,7 +114,7 @@ def _split(text: bytes, numbers: Sequence[bytes]) -> Pieces | None:
 
 def _number_text(form: Form, octets: bytes) -> bytes:
     if form is Form.REAL:
-        return b"%.7g" % float(struct.unpack(">f", octets)[0])
+        return shortest_text(struct.unpack(">f", octets)[0]).encode()
     number = int.from_bytes(octets) & int.from_bytes(form.mask)
     return (b"%04X" if form is Form.HEX else b"%d") % number
 
@@ -133,8 +134,9 @@ def _with_numbers(numbers: Numbers, pieces: Sequence[Pieces], which: Times) -> t
 
 def _numbers(form: Form, values: Octets) -> Column:
     if form is Form.REAL:
-        reals = np.ascontiguousarray(values).view(">f4").ravel().astype(np.float64).tolist()
-        return matrix([b"%.7g" % real for real in reals])
+        distinct, which = np.unique(np.ascontiguousarray(values).view(">u4"), return_inverse=True)
+        reals = distinct.astype(np.uint32).view(np.float32).astype(np.float64).tolist()
+        return Chosen.of([shortest_text(real).encode() for real in reals], which.ravel())
     if form is Form.INSTANCE:
         return digits((values.copy().view(">u4").ravel() & int.from_bytes(form.mask)).astype(np.int64))
     words = values[:, 0].astype(np.uint16) << 8 | values[:, 1]

@@ -20,6 +20,7 @@ from dissectors.bacnet.readings import asks, readings
 from dissectors.bacnet.text import parameters_text
 from dissectors.bacnet.values import Double, Enumerated, shortest, show
 from dissectors.frame import Check, FoundBy, Frame
+from dissectors.single_reals import shortest
 
 MASTER, DRIVE = 1, 5
 

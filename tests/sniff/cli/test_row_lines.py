@@ -13,18 +13,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dissectors import registry
+from dissectors.bacnet.envelope import npdu_frame
 from dissectors.bacnet.stencils import mstp_stencil
-from dissectors.frame import Role
+from dissectors.frame import Chunk, Role
+from dissectors.line import LineSettings
 from dissectors.manifest import Dissector
 from dissectors.modbus.stencils import rtu_stencil
+from dissectors.single_reals import shortest
 from dissectors.stencil import Form
 from sniff.bus import row_words as rows
+from sniff.bus.offline import settled as settled_rows
 from sniff.bus.offline import settled_columns
 from sniff.cli.byte_columns import digits, fixed_digits, hex_octets, joined
 from sniff.cli.row_lines import RowLines
 from sniff.engine.column_join import SettledRows
 from sniff.engine.follow_settings import dissector_for
-from sniff.formats import read
+from sniff.engine.session import Session
+from sniff.formats import create_of_items, read
 
 CAPTURES = Path(__file__).parents[3] / "captures"
 
@@ -117,8 +122,27 @@ def test_octets_as_hexadecimal_digits(texts: list[bytes]) -> None:
     assert b"".join(joined([column, b" "], 0, len(texts))).decode() == "".join(f"{one.hex()} " for one in texts)
 
 
-@given(st.lists(st.floats(width=32, allow_nan=False, allow_infinity=False), min_size=1, max_size=9))
-def test_seven_digits_of_octets_are_those_of_a_float(values: list[float]) -> None:
-    octets = struct.pack(f">{len(values)}f", *values)
-    reals = np.frombuffer(octets, ">f4").astype(np.float64).tolist()
-    assert [b"%.7g" % real for real in reals] == [f"{value:.7g}".encode() for value in values]
+LONG = (21.537842, 1.7251986e-37, 1e8, 16_777_216.0, -0.0, 3.4028234663852886e38, 123_456.79, 1e-45)
+
+
+def test_reals_have_all_their_digits(tmp_path: Path) -> None:
+    """In a column as alone: what one has of another form stands in the same line."""
+    session, now, path = Session("x", LineSettings(38400), "mstp"), 10**9, tmp_path / "reals.cap.txt"
+    with create_of_items(path, session) as file:
+        for number, real in enumerate([*LONG, *map(float, range(20))]):
+            about = bytes((number, 12)) + b"\x0c\0\0\0\1\x19\x55"
+            value = b"\x3e\x44" + struct.pack(">f", real) + b"\x3f"
+            for octets in (
+                npdu_frame(2, 1, b"\1\4\0\5" + about, expects_reply=True),
+                npdu_frame(1, 2, b"\1\0\x30" + about + value, expects_reply=False),
+            ):
+                now += 10_000_000
+                file.write(Chunk(now, octets))
+    capture, dissector = read(path), dissector_for(session)
+    made, told = RowLines(dissector, session), []
+    for settled in settled_columns(capture, session):
+        told += _lines(made, settled).splitlines()
+    items = settled_rows(capture.items(), session)
+    assert told == [rows.text_line(item, dissector, session, False) for item in items]
+    assert [shortest(real) for real in LONG[:2]] == [21.537842, 1.7251986e-37]
+    assert sum("= 21.537842" in line for line in told) == 1
