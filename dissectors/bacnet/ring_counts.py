@@ -47,8 +47,10 @@ class RingCounts:
         self._pairs = columns.source[self._polls] << 8 | columns.destination[self._polls]
         self._asked, self._replies = np.flatnonzero(columns.asked), np.flatnonzero(columns.poll_reply)
         self._asked_whom, self._replied = columns.destination[self._asked], columns.source[self._replies]
+        self._answers = np.flatnonzero(columns.answers & columns.data)
+        self._answered = columns.source[self._answers]
         self._polling = self._pairs >> 8
-        self._known: tuple[set[int], ...] = (set(), set(), set(), set(), set())
+        self._known: tuple[set[int], ...] = (set(), set(), set(), set(), set(), set())
         # what the first token of a run says, by station
         self._loops: list[tuple[int, int, int]] = []  # with its place
         self._holds: list[tuple[int, int]] = []
@@ -57,7 +59,8 @@ class RingCounts:
     def unknown(self, begin: int, end: int) -> int:
         """The first row that brings somebody or something new to the tally; `end` where none does.
 
-        It must be seen by itself, in its turn: a sender, a way of the token, who is asked, polls or answers a poll.
+        It must be seen by itself, in its turn: a sender, a way of the token, who is asked or answers, polls or answers
+        a poll.
         """
         columns, nodes, edges = self._columns, self._tally.nodes, self._tally.edges
 
@@ -71,6 +74,7 @@ class RingCounts:
             lambda mac: mac in nodes,
             polls,
             lambda mac: mac in nodes and nodes[mac].poll_replies_sent,
+            lambda mac: mac in nodes and nodes[mac].replies,
         )
         keyed = (
             (np.arange(begin, end), columns.source[begin:end]),
@@ -78,6 +82,7 @@ class RingCounts:
             self._of(self._asked, self._asked_whom, begin, end),
             self._of(self._polls, self._polling, begin, end),
             self._of(self._replies, self._replied, begin, end),
+            self._of(self._answers, self._answered, begin, end),
         )
         firsts: list[int] = []
         for (places, keys), known, ask in zip(keyed, self._known, is_known, strict=True):

@@ -178,6 +178,21 @@ def test_a_token_that_was_not_heard_is_over_when_the_next_one_is() -> None:
     same(by_tables(items, judged(session), random.Random(1), 1 << 30), expected)
 
 
+def test_who_answered_in_a_run_is_known_to_answer() -> None:
+    """Who asked it goes on 200 ms later, sooner than it may give up: it had the answer, which was not heard."""
+    asked, acked = bytes.fromhex("01040275000c0c000000041955"), bytes.fromhex("010020000c")
+    asks, answers = (2, npdu_frame(9, 2, asked, True)), (9, npdu_frame(2, 9, acked, False))
+    steps = rounds(12, 2, 5, 9)
+    for _ in range(8):
+        steps += [asks, answers, *rounds(4, 2, 5, 9)]
+    steps += [asks, (200, token(2, 5)), *rounds(12, 2, 5, 9)[1:]]
+    session = Session("x", bulk_mstp.LINE, "mstp")
+    items = list(tables([Block(reads_of(chunks_of(steps)))], session))
+    expected = by_rows(items, judged(session))
+    assert "MS406" in {one.code for one in expected.findings()}
+    same(by_tables(items, judged(session), random.Random(1), 1 << 30), expected)
+
+
 def test_octets_lost_on_the_way_tear_the_same_transactions() -> None:
     """The same hole between the same rows, wherever tables are cut: it is pending over several of them."""
     session, reads = _mstp(0.01)
