@@ -96,13 +96,14 @@ def hurried(gaps: Gaps, pauses: list[int]) -> list[int]:
     return [at for at in doubtful if gaps.is_hurried(pauses[at], every[max(0, begin + at - SPACING_KEPT) : begin + at])]
 
 
-def turns_before(gaps: Gaps, rows: RowColumns, requests: list[int], first: int) -> tuple[Times, Times]:
-    """`Rhythm.turns` up to each of some requests behind answers, in a stretch that begins with row `first`; 0 where
-    that is not known."""
+def turns_before(gaps: Gaps, rows: RowColumns, requests: list[int], first: int) -> tuple[Times, Times, Masks]:
+    """`Rhythm.turns` up to each of some requests behind answers, in a stretch that begins with row `first`; whether
+    that is known."""
     start, end, at = rows.frames.start, rows.frames.end, np.array(requests, np.int64)
     inside = at > first
     asked = start[np.where(inside, at - 2, 0)]
     cycles, answers = np.where(inside, start[at] - asked, 0), np.where(inside, end[at - 1] - asked, 0)
     if requests[:1] == [first] and gaps.asked is not None and gaps.answered is not None:
         cycles[0], answers[0] = int(start[first]) - gaps.asked, gaps.answered.end - gaps.asked
-    return cycles, answers
+        inside[0] = True
+    return cycles, answers, inside

@@ -24,7 +24,7 @@ from dissectors.modbus.station_record import Key, Requested, StationRecord
 from dissectors.rhythm import TURNS_KEPT
 
 if TYPE_CHECKING:
-    from dissectors.columns import Times
+    from dissectors.columns import Masks, Times
     from dissectors.modbus.observer import ModbusFindings
 
 
@@ -68,7 +68,7 @@ class StretchEvidence:
         self._compared: list[_Request] = []
         self._pause_rows: list[int] = []
         self._pauses: list[int] = []
-        self._turns: tuple[Times, Times] = np.zeros(0, np.int64), np.zeros(0, np.int64)
+        self._turns: tuple[Times, Times, Masks] = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, bool)
         self._hurried: set[int] = set()
         self._paused = 0
         self._learn_timeout()
@@ -79,7 +79,7 @@ class StretchEvidence:
         end: int,
         pause_rows: list[int],
         pauses: list[int],
-        turns: tuple[Times, Times],
+        turns: tuple[Times, Times, Masks],
         hurried: list[int],
     ) -> None:
         """Take exchanges [begin, end). `pauses`: the master's, ns, before the rows `pause_rows`, and which of them are
@@ -323,8 +323,8 @@ class StretchEvidence:
         if self._hurried:
             gaps.hurried.extend(first + self._pause_rows[at] - 1 for at in range(begin, end) if at in self._hurried)
         newest = slice(max(begin, end - TURNS_KEPT), end)
-        cycles, answers = (times[newest].tolist() for times in self._turns)
-        turns = [turn for turn in zip(cycles, answers, strict=True) if turn[1]]
+        cycles, answers, known = (column[newest] for column in self._turns)
+        turns = zip(cycles[known].tolist(), answers[known].tolist(), strict=True)
         gaps.paused(self._pauses[begin:end], turns)
         self._paused = end
 

@@ -86,3 +86,16 @@ def test_of_a_quiet_bus_no_row_becomes_an_object_but_the_last(monkeypatch: pytes
         judge.take(table)
     assert len(looked_at) < 10
     assert judge.seen.answers > 390
+
+
+def test_exchanges_within_one_instant_leave_the_same() -> None:
+    """Of times in steps an answer may end when its request begins: that is a turn, too."""
+    session, reads = bus(3, exchanges=150, troubles=())
+    reads = replace(reads, times=-(-reads.times // 300_000_000) * 300_000_000)
+    made = [one for one in tables([Block(reads)], session) if isinstance(one, Table)]
+    by_rows, by_columns = BulkModbusFindings(session.timing), BulkModbusFindings(session.timing)
+    for table in made:
+        in_turn(by_rows, table)
+        by_columns.take(table)
+    assert any(not answer for _, answer in by_rows.seen.rhythm.turns)
+    assert memory(by_columns) == memory(by_rows)

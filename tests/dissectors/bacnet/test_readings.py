@@ -18,7 +18,7 @@ from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.questions import question
 from dissectors.bacnet.readings import asks, readings
 from dissectors.bacnet.text import parameters_text
-from dissectors.bacnet.values import Double, Enumerated, shortest, show
+from dissectors.bacnet.values import Double, Enumerated, show
 from dissectors.frame import Check, FoundBy, Frame
 from dissectors.single_reals import shortest
 
