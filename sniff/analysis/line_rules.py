@@ -107,7 +107,7 @@ _ALL = (
         Severity.NOTE,
         "clock stepped",
         "The wall clock of the computer was set against its monotonic clock. Intervals are not affected.",
-        "time synchronisation after a start without network; in a log of local time, the end of summer time",
+        "time synchronisation after a start without network; in a log of local time, summer time that begins or ends",
         "nothing; only compare wall times across the step with care",
     ),
     Rule(
