@@ -18,7 +18,7 @@ from sniff.devices import with_devices
 from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
-from sniff.formats.linktypes import held_by_protocols
+from sniff.formats.linktypes import held_by_protocols, written_link_types
 
 TABLES = (".csv", ".parquet")
 """Suffixes of tables of frames."""
@@ -36,9 +36,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--link-type",
         type=int,
-        choices=[147, 165, 250, 252],
+        choices=written_link_types(),
         help="pcap, pcapng: 252 exported PDU and 165 open in Wireshark as they are, 147 is the bare frame (needs a "
-        "DLT_USER entry), 250 RTAC serial with line errors (needs Decode As). "
+        "DLT_USER entry), 250 RTAC serial with line errors (needs Decode As), 257 the bare frame of PROFIBUS. "
         f"What can hold what, the default first: {held_by_protocols()}",
     )
     parser.add_argument("--microseconds", action="store_true", help=".pcap: times in µs, for programs that know no ns")

@@ -181,4 +181,5 @@ def _find(written: dict[str, str], path: Path) -> Any:
     for suffix, target in written.items():
         if path.name.lower().endswith(suffix):
             return table.function(target)
-    raise CaptureError(f"{path}: unknown suffix; expected one of {' '.join(written)}")
+    every = {**table.writers(ITEMS), **table.writers(FRAMES)}  # whoever asks may have chosen among both
+    raise CaptureError(f"{path}: unknown suffix; expected one of {' '.join(every)}")

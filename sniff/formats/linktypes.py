@@ -177,6 +177,11 @@ def link_type_for(protocol: str, wanted: int | None = None) -> int:
     return wanted if wanted is not None else allowed[0]
 
 
+def written_link_types() -> list[int]:
+    """Every link type that some protocol can be written with."""
+    return sorted({number for _, held in _held() for number in held.link_types})
+
+
 def held_by_protocols() -> str:
     """Which link types can hold which protocol, in words, the one written by default first."""
     return "; ".join(f"{one.name}: {', '.join(map(str, held.link_types))}" for one, held in _held())

@@ -59,3 +59,16 @@ def test_a_station_is_called_what_its_people_call_it(capsys: pytest.CaptureFixtu
 def test_what_a_site_explains_costs_the_bus_no_health() -> None:
     told = (CAPTURES / "sites/power-lost.check.txt").read_text("utf-8")
     assert told.count("health 100") == 3
+
+
+def test_every_link_type_that_the_help_names_can_be_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "x.pcapng"
+    assert main(["convert", f"{CAPTURES}/profibus-clean.cap.txt", str(out), "--link-type", "257"]) == 0
+    assert out.stat().st_size > 10_000
+
+
+def test_an_unknown_suffix_is_told_all_that_can_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["convert", f"{CAPTURES}/rtu-clean.cap.txt", str(tmp_path / "x.foo")]) != 0
+    assert ".mcap .cap.txt .pcapng .pcap" in capsys.readouterr().err
