@@ -1,6 +1,6 @@
 """Before and after a repair: stations, answers, times, values, findings. A time counts as changed when it moved by a
-tenth and by more than both adapters together may have added; a value when the newest readings before and after have no
-number in common. Exit code 1 when something differs.
+tenth and by more than both adapters together may have added (p50 of 3 answers and more on both sides, p95 of 20); a
+value when the newest readings before and after have no number in common. Exit code 1 when something differs.
 """
 
 from __future__ import annotations

@@ -17,6 +17,9 @@ from sniff.analysis.summary import Summary
 NOTICEABLE = 0.02
 """A share has changed when it moved by as much; a time when it moved by a tenth and more than the adapters allow."""
 
+MEDIAN_LEAST, TAIL_LEAST = 3, 20
+"""Answers on both sides from which on their p50 and their p95 are compared: the longest of two is no p95."""
+
 COMPARED_VERDICTS = (Verdict.NO_RESPONSE, Verdict.EXCEPTION, Verdict.DAMAGED_ANSWER, Verdict.LATE, Verdict.RETRY)
 
 
@@ -89,7 +92,9 @@ def _node(subject: str, old: Node, new: Node, doubt: int) -> Iterator[Difference
         was, now = _share(old.verdicts[verdict], old.asked), _share(new.verdicts[verdict], new.asked)
         if abs(was - now) >= NOTICEABLE or (was == 0) != (now == 0):
             yield Difference(subject, verdict.words, f"{percent(was)} of {old.asked}", f"{percent(now)} of {new.asked}")
-    for name, share in (("response p50", 0.5), ("response p95", 0.95)):
+    for name, share, least in (("response p50", 0.5, MEDIAN_LEAST), ("response p95", 0.95, TAIL_LEAST)):
+        if min(old.latency.count, new.latency.count) < least:
+            continue  # of so few the next ones would differ as much
         was_time, now_time = old.latency.quantile(share), new.latency.quantile(share)
         if was_time is None or now_time is None:
             continue

@@ -72,3 +72,8 @@ def test_every_link_type_that_the_help_names_can_be_asked_for(
 def test_an_unknown_suffix_is_told_all_that_can_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["convert", f"{CAPTURES}/rtu-clean.cap.txt", str(tmp_path / "x.foo")]) != 0
     assert ".mcap .cap.txt .pcapng .pcap" in capsys.readouterr().err
+
+
+def test_the_longest_of_two_answers_is_no_difference(capsys: pytest.CaptureFixture[str]) -> None:
+    before, after = f"{CAPTURES}/mstp-clean.cap.txt", f"{CAPTURES}/findings/ms-tp-address-twice.cap.txt"
+    assert "response" not in said(capsys, "diff", before, after)
