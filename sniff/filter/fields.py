@@ -51,7 +51,7 @@ _LINE_ERRORS = {one: (one.name or "").lower() for one in LineError}
 
 COLUMN_TYPES: Mapping[str, FieldType] = {
     "no": FieldType(_NUMBER, "number of the row, from 1", least=1),
-    "frame.time": FieldType(Kind.TIME, "when it began, UTC"),
+    "frame.time": FieldType(Kind.TIME, "when it began; UTC, in the terminal UI local time"),
     "frame.time_relative": FieldType(Kind.DURATION, "since the capture began", unit="s"),
     "frame.time_delta": FieldType(Kind.DURATION, "from the begin of the row before to its own", unit="s"),
     "start_ns": FieldType(_NUMBER, "ns since the capture began, of its begin", least=0),
