@@ -89,9 +89,9 @@ _ALL = (
         "MB107",
         Severity.WARNING,
         "master gives up too soon",
-        "Good answers of two stations or more that come after the master's timeout, three at least and 1 in 3 not of "
-        "the same one, where half of the stations answer late or have damage directly behind waits for them in vain, "
-        "and 3 in 4 damaged frames, if any are, stand where an answer is overdue.",
+        "Good answers of two stations or more that come after the master's timeout, three at least; where half of the "
+        "stations answer late, have damage directly behind waits for them in vain, or are shown in it, 1 in 3 times "
+        "not the same one; and where 3 in 4 damaged frames, if any are, stand where an answer is overdue.",
         "the master's response timeout is shorter than its stations need; late answers fall on what it sends next",
         "raise the master's response timeout above the slowest answer, with room; then look at what is left",
         explains=(

@@ -46,7 +46,8 @@ def of_late_speakers(seen: BusRecord) -> Iterator[Finding]:
             named.add(unit)
             yield station.outlasting.found(RULES["MB106"], f"station {unit}", f"{words} into them")
     perhaps = perhaps_late(seen.late_speakers, whole, heard) if not named else None
-    if perhaps is not None and not seen.rare(perhaps.struck, perhaps.of + perhaps.of_elsewhere):
+    is_shown = perhaps is not None and seen.stations[perhaps.station].late.count >= _SEEN_LATE  # by MB103
+    if perhaps is not None and not is_shown and not seen.rare(perhaps.struck, perhaps.of + perhaps.of_elsewhere):
         yield perhaps.told_of(RULES["MB106"])
 
 
@@ -55,10 +56,11 @@ def of_impatience(seen: BusRecord, timeout: int | None) -> Iterator[Finding]:
     there = {unit: one for unit, one in seen.stations.items() if one.answered + one.late.count >= _HEARD}
     late = {unit: one for unit, one in there.items() if one.late.count}
     count = sum(one.late.count for one in late.values())
-    most = max((one.late.count for one in late.values()), default=0)
-    if len(late) < _STATIONS or count < _LATE or 2 * count < 3 * most:
+    shown = {unit: one.late.count + _hits(_window(seen, unit)) for unit, one in there.items()}
+    is_one = 2 * sum(shown.values()) < 3 * max(shown.values(), default=0)  # and hardly anybody else
+    if len(late) < _STATIONS or count < _LATE or is_one:
         return
-    waited = {unit: one for unit, one in there.items() if one.late.count or _hits(_window(seen, unit))}
+    waited = {unit: there[unit] for unit, often in shown.items() if often}
     damaged, overdue = _damaged(seen), seen.late_speakers.overdue
     in_vain = count + sum(one.missing.count for one in waited.values())
     if 2 * len(waited) < len(there) or 4 * overdue < 3 * damaged or damaged > _EACH * in_vain:
@@ -128,8 +130,8 @@ def _window(seen: BusRecord, unit: int) -> Window:
 
 
 def _hits(window: Window) -> int:
-    """How often damage stood directly behind a wait for a station."""
-    return window.behind.count + window.own_behind.count
+    """How often damage stood directly behind a wait for a station, or showed that it spoke."""
+    return window.behind.count + window.own_behind.count + window.shown.total()
 
 
 def _damaged(seen: BusRecord) -> int:
