@@ -195,7 +195,7 @@ class BusRecord:
     @property
     def hears_nobody(self) -> bool:
         """Whether nothing was heard that a station may have sent."""
-        heard = any(one.last_heard is not None or one.undecided.count for one in self.stations.values())
+        heard = any(one.is_heard for one in self.stations.values())
         return not (heard or self.answers or self.echoes)
 
     def scanned(self) -> list[int]:

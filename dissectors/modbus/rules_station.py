@@ -17,7 +17,7 @@ from dissectors.modbus.functions import EXCEPTIONS as EXCEPTION_NAMES
 from dissectors.modbus.header import code_number
 from dissectors.modbus.response_groups import AnsweredRequest
 from dissectors.modbus.rules import RULES
-from dissectors.modbus.station_record import Key, Requested, StationRecord
+from dissectors.modbus.station_record import STRAY, Key, Requested, StationRecord
 from dissectors.modbus.struck_octet import falls_there_by_chance
 from dissectors.modbus.talked_over import second_voice
 from dissectors.words import duration, fine_milliseconds, percent
@@ -154,7 +154,7 @@ def is_absent(station: StationRecord) -> bool:
     # a late read puts the repeat of a write where its answer would be
     answered = station.answered - (station.copies if _RARELY * station.copies <= station.asked else 0)
     heard = answered or station.late.count or station.twice.count or station.undecided.count > station.asked
-    return bool(station.missing.count) and not heard and 4 * station.damaged.count <= station.asked
+    return bool(station.missing.count) and not heard and STRAY * station.damaged.count <= station.asked
 
 
 def _is_ignored(request: Requested) -> bool:

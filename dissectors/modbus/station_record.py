@@ -151,6 +151,10 @@ class Lost:
     is_waited_for: bool = False
 
 
+STRAY = 4
+"""Of so many requests to nobody who is heard one may be followed by octets that are no good frame."""
+
+
 @dataclass(slots=True)
 class StationRecord:
     """One station. `missing`: no octet followed. `silent`: those since its last sign of life; `away`: the most of them
@@ -284,8 +288,14 @@ class StationRecord:
             request.tries -= 1
             request.turns -= request.turns > 0
 
+    @property
+    def is_heard(self) -> bool:
+        """Whether anything came from it but what stray octets in place of answers look like."""
+        frames = self.answered or self.late.count or self.twice.count or self.undecided.count
+        return bool(frames) or STRAY * self.damaged.count > self.asked
+
     def heard(self, time: int) -> None:
-        """Something came from it."""
+        """Something came in place of its answer."""
         self.last_heard = time
         if self.silent.count:
             self.away = max(self.away, self.silent, key=lambda one: one.count)

@@ -232,12 +232,18 @@ def _unheard(heard: N2Evidence) -> Iterator[Finding]:
     yield heard.noted_if(heard.is_rare(tally, asked), tally.found(RULES["N2015"], "bus", seen))
 
 
+_STRAY = 4
+"""Of so many commands to nobody who is heard one may be followed by octets that are no good frame."""
+
+
 def _silent(heard: N2Evidence, scanned: frozenset[int]) -> frozenset[int]:
-    """All stations that were asked, where they are several and none was heard at all."""
+    """All stations that were asked, where they are several and none was heard at all but for stray octets."""
     asked = {address: one for address, one in heard.stations.items() if one.asked and address not in scanned}
     if len(asked) < 2 or heard.stray.count:
         return frozenset()
-    if any(one.answered or one.late.count or one.sent.bad.count for one in heard.stations.values()):
+    if any(
+        one.answered or one.late.count or _STRAY * one.sent.bad.count > one.asked for one in heard.stations.values()
+    ):
         return frozenset()
     return frozenset(address for address, one in asked.items() if heard.missing(one).count > heard.unheard(one).count)
 
@@ -254,7 +260,7 @@ def _nobody(heard: N2Evidence, silent: frozenset[int]) -> Finding:
 def _missing(heard: N2Evidence, name: str, station: N2StationRecord) -> Finding:
     tally, rule = heard.missing(station), RULES["N2005"]
     if not station.answered and not station.late.count:
-        if station.turns <= 1 and station.asked <= TRIES:
+        if station.asked <= (TRIES if station.turns <= 1 else 1):  # of another turn nobody knows yet what became
             tries = "the only command" if station.asked == 1 else f"the {station.asked} commands of one turn"
             return tally.found(rule, name, f"no answer to {tries}", Severity.NOTE)
         return tally.found(rule, name, f"no answer to any of {counted(station.asked, 'command')}", Severity.ERROR)

@@ -11,6 +11,8 @@ from dissectors.simulated_faults import Break, MarkParity, NoiseInGaps
 from sniff.simulation.tap import FTDI
 from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case
+from tests.faults.hearing import unheard
+from tests.faults.interference import Interference
 from tests.faults.line_faults import (
     Anywhere,
     AtTimes,
@@ -22,6 +24,7 @@ from tests.faults.line_faults import (
 )
 from tests.faults.profibus_cases import profibus
 from tests.faults.stations import Dies, Of, Pauses
+from tests.faults.workbench import Modbus, usual_requests, usual_stations
 
 MS = 1_000_000
 S = 1_000_000_000
@@ -29,7 +32,17 @@ S = 1_000_000_000
 _five = partial(modbus, units=(1, 2, 3, 4, 5))
 _quick = partial(modbus, line=LineSettings.parse("38400,8E1"))
 
+_sparks = partial(Interference, 1_500 * MS, jitter=None, octets=(1, 3))
+
 LINE_RULE_CASES: tuple[Case, ...] = (
+    Case(
+        "line, only the master heard, and sparks",
+        Modbus(usual_requests((1, 2, 3)), usual_stations((1, 2, 3)), others={"sparks": _sparks}),
+        (("MB020", "bus"),),
+        hear=partial(unheard, ("unit 1", "unit 2", "unit 3"), 1.0),
+        never=("MB001",),
+        seeds=1,
+    ),
     Case("line, hum at 50 Hz", partial(_quick, (AtTimes(20 * MS, 2 * MS, 0.1),)), (("LN301", "bus"),)),
     Case("line, hum at 60 Hz, half waves", partial(_quick, (AtTimes(8_333_333, MS, 0.06),)), (("LN301", "bus"),)),
     Case("line, contactor", partial(_five, (AtTimes(7 * S, 150 * MS, 0.2),)), (("LN302", "bus"),)),

@@ -54,6 +54,16 @@ def test_where_nobody_is_heard_and_nobody_asked_again_it_is_told_once(paper_bus)
     assert graves_of(bus) == {("MB020", "bus")}
 
 
+def test_stray_octets_do_not_make_somebody_of_nobody(paper_bus):
+    bus = paper_bus()
+    for turn in range(8):
+        for unit in UNITS:
+            bus.say(read(unit), PAUSE if (turn, unit) != (3, 3) else 90.0)
+            if (turn, unit) == (3, 2):
+                bus.noise(b"\xfe\x00\xff")
+    assert graves_of(bus) == {("MB020", "bus")}
+
+
 def waiting(bus, count, wait, tries=1, lost=lambda turn: True):
     """Station 2 does not answer in some turns; the master waits `wait` ms, and tries so often."""
     pause = PAUSE

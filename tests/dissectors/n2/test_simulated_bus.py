@@ -30,6 +30,7 @@ from dissectors.simulated_faults import BitFlips, DuplicateAddress, Fault, LateR
 from dissectors.tracker import Transaction, Verdict
 from sniff.simulation.tap import EXACT, MODELS, Tap, TapModel
 from sniff.simulation.wire import Party, Wire
+from tests.faults.interference import Interference
 
 MS = 1_000_000
 S = 1_000 * MS
@@ -447,3 +448,20 @@ def test_a_catalogue_entry_for_each_finding():
 def test_nobody_heard_but_a_master_that_waits_is_one_finding_about_the_bus():
     heard = listen(bus([], [quick([reading(3, 1, 1), reading(4, 1, 1)])]), 60 * S)
     assert [(f.code, f.subject, f.severity) for f in heard.findings] == [("N2005", "bus", Severity.ERROR)]
+
+
+def test_stray_octets_in_place_of_a_few_answers_make_nobody_of_them():
+    master = quick([reading(3, 1, 1), reading(4, 1, 1)])
+    stray = Interference(S, jitter=None, octets=(1, 3))
+    parties = [Party("master", master, answers=False), Party("stray", stray, answers=False)]
+    heard = listen(Wire(LINE, parties, (), 1), 60 * S)
+    assert [(f.code, f.subject) for f in heard.findings if f.severity >= Severity.WARNING] == [("N2005", "bus")]
+
+
+@pytest.mark.parametrize("until", range(3, 15))
+def test_one_command_that_is_not_answered_is_no_error(until):
+    """However the capture ends: of the next one to that station nobody knows yet what becomes."""
+    master = quick([reading(1, 1, 1), reading(9, 1, 1)], retries=0, timeout=300 * MS)
+    heard = listen(bus([Follower(1)], [master]), S + until * 100 * MS)
+    asked = [f.severity for f in heard.findings if f.code == "N2005" and f.count == 1]
+    assert set(asked) <= {Severity.NOTE}
