@@ -80,7 +80,7 @@ class Dissector:
     readings in their frame. `asks`: the places that a request reads.
     `answer_fields(request, answer)`: fields of an answer that only its request tells.
 
-    `default_line`: what such a bus normally runs ("19200,8E1").
+    `default_line`: what such a bus normally runs ("19200,8E1"); the fastest where packets of a network hold frames.
     `other_lines`: what else such a bus runs, where those are not the usual rates and formats; a search tries them, too.
     `field_prefixes`: how the names in `fields` begin ("modbus."), so that filters know them; the protocol's name and a
     dot where none are given.

@@ -329,7 +329,7 @@ def say_assumed(session: Session, path: str, way_out: str = "") -> None:
         print(
             f"sniff485: {sanitized(path)}: reading it as {title} ({sanitized(told)}); -p names another", file=sys.stderr
         )
-    if session.line_is_assumed:
+    if session.line_is_assumed and session.protocol not in registry.RELATIVES:
         said = f"no line settings in {sanitized(path)}: assuming {session.line} for {session.protocol}{way_out}"
         print(f"sniff485: {said}", file=sys.stderr)
 

@@ -81,7 +81,7 @@ def _of_session(args: argparse.Namespace, session: Session) -> tuple[Outcome, st
         return Outcome(Ending.UNKNOWN if octets else Ending.SILENT, None, 1, octets), ""
     cannot: tuple[str, ...] = ()
     line = session.line
-    if session.line_is_assumed:
+    if session.line_is_assumed and reading.protocol not in registry.RELATIVES:
         line = detected(replace(session, protocol=reading.protocol, line=reading.line)).line
         cannot = (
             (f"the format beside {line.baud} Bd, which the times of its octets tell",)
@@ -137,7 +137,7 @@ def to_json(port: str, outcome: Outcome) -> dict[str, object]:
     return {
         "port": port,
         "outcome": outcome.ending.value,
-        "line": None if reading is None else str(reading.line),
+        "line": None if reading is None or reading.protocol in registry.RELATIVES else str(reading.line),
         "protocol": None if reading is None else reading.protocol,
         "evidence_bits": None if reading is None else round(reading.bits, 1),
         "frames": None if reading is None else reading.frames,

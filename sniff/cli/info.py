@@ -7,6 +7,7 @@ import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from dissectors import registry
 from dissectors.findings import counted
 from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
@@ -99,8 +100,8 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary, fo
         "seconds": summary.seconds if session.has_times else None,
         "unheard_seconds": summary.load.holes.total / NS_PER_S if session.has_times else None,
         "protocol": None if "protocol" in session.unknown else session.protocol,
-        "line": None if "line" in session.unknown else str(session.line),
-        "line_assumed": session.line_is_assumed,
+        "line": None if "line" in session.unknown or _is_of_network(session) else str(session.line),
+        "line_assumed": session.line_is_assumed and not _is_of_network(session),
         "port": session.port,
         "adapter": session.adapter.name,
         "adapter_latency_ms": session.adapter.latency / MS,
@@ -110,7 +111,7 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary, fo
         "frames": summary.frames,
         "damaged": summary.damaged,
         "noise_octets": summary.noise,
-        "load": summary.load.overall() if session.has_times else None,
+        "load": summary.load.overall() if session.has_times and not _is_of_network(session) else None,
         "damages": ranked(summary.damages),
         "second_protocol": None if foreign is None else {"protocol": foreign[0].name, "frames": foreign[1]},
         "kinds": ranked(summary.kinds),
@@ -191,7 +192,8 @@ def _print(
     _line("reports", f"line errors: {reports}{'; ' + adapter.detail if adapter.detail else ''}")
     searched = f"{summary.searched} of them while searching, " if summary.searched else ""
     octets = summary.octets + summary.searched
-    load = f"; bus load {percent(summary.load.overall())}" if session.has_times else ""
+    has_load = session.has_times and not _is_of_network(session)
+    load = f"; bus load {percent(summary.load.overall())}" if has_load else ""
     _line("octets", f"{octets}, {searched}{summary.noise} of them noise{load}")
     if foreign is not None:
         many = counted(foreign[1], "frame")
@@ -250,8 +252,15 @@ def _settings(session: Session) -> str:
     title = "unknown" if "protocol" in session.unknown else dissector_for(session).title
     if "line" in session.unknown:
         return f"{title}, line settings unknown"
+    if _is_of_network(session):
+        return f"{title}, {session.line_words}"
     told = "assumed" if session.line_is_assumed else sanitized(session.notes.get(LINE_NOTE, ""))
     return f"{title}, {session.line}{f' ({told})' if told else ''}"
+
+
+def _is_of_network(session: Session) -> bool:
+    """Whether its frames are packets, which take no time on a line."""
+    return session.protocol in registry.RELATIVES
 
 
 def _search(session: Session, summary: Summary, events: list[LineEvent]) -> str:

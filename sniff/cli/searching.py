@@ -63,7 +63,8 @@ def sentence(outcome: Outcome, advice: str = "--timeout gives the search longer"
     """The outcome in words; `advice`: what to do where nothing made sense."""
     reading = outcome.reading
     if reading is not None:
-        name = f"{registry.get(reading.protocol).title}, {reading.line}"
+        line = "no serial line" if reading.protocol in registry.RELATIVES else reading.line
+        name = f"{registry.get(reading.protocol).title}, {line}"
         return name if outcome.ending is Ending.FOUND else f"probably {name}; not enough was heard to be sure"
     if outcome.ending is Ending.SILENT:
         return "silent: not one octet came; is the bus powered, A and B connected, the master polling?"

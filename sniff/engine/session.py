@@ -181,8 +181,9 @@ class Session:
 
     @property
     def line_words(self) -> str:
-        """The line settings, "unknown" when nobody knows them."""
-        return "unknown" if "line" in self.unknown else str(self.line)
+        """The line settings, "unknown" when nobody knows them, "no serial line" of packets of a network."""
+        known = "no serial line" if self.protocol in registry.RELATIVES else str(self.line)
+        return "unknown" if "line" in self.unknown else known
 
     @property
     def protocol_words(self) -> str:

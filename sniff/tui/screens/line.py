@@ -56,9 +56,9 @@ def settings(store: Store, status: FeedStatus) -> list[Part]:
     session = store.session
     timing, adapter = session.timing, session.adapter
     names = ", ".join(sanitized(part) for part in (adapter.name, adapter.driver, adapter.serial_number) if part)
-    characters = f"one character {milliseconds(timing.char)}, 3.5 of them {milliseconds(timing.t35)}"
+    line = f"{session.line} · one character {milliseconds(timing.char)}, 3.5 of them {milliseconds(timing.t35)}"
     return [
-        ("line", Text(f"{sanitized(session.line)} · {characters}")),
+        ("line", Text(session.line_words if session.protocol in registry.RELATIVES else sanitized(line))),
         (
             "adapter",
             Text(f"{names} · {sanitized(adapter.delay_words)}" if session.has_times else names),

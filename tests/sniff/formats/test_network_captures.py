@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import random
 from collections.abc import Callable
 from pathlib import Path
@@ -190,6 +191,30 @@ def test_modbus_tcp_is_paired_by_its_transactions(
     assert main(["stats", str(path), "--bus", capture.names[0]]) == 0
     assert main(["convert", str(path), str(tmp_path / "y.mcap"), "--bus", capture.names[0]]) == 0
     assert read(tmp_path / "y.mcap").session.protocol == "modbus-tcp"
+
+
+def test_octets_of_a_packet_come_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """At the rate of a line a long answer would have begun before it was asked for, and no response time were right."""
+    server = (SERVER[0], 502)
+    asked, answer = bytes.fromhex("000700000006010300000078"), bytes.fromhex("0007000000F30103F0") + bytes(240)
+    said = [
+        (0, tcp(CLIENT, server, 1, b"", SYN)),
+        (1, tcp(CLIENT, server, 2, asked)),
+        (31, tcp(server, CLIENT, 1, answer)),
+    ]
+    path = as_pcap(tmp_path / "x.pcap", [(START + time * MS, packet) for time, packet in said])
+    assert main(["show", str(path), "--json"]) == 0
+    ran = capsys.readouterr()
+    assert json.loads(ran.out.splitlines()[1])["latency_ms"] == pytest.approx(30, abs=0.3)
+    assert ran.err == ""  # there is no line whose settings were to be named
+    assert main(["info", str(path)]) == 0
+    out = capsys.readouterr().out
+    assert "Modbus TCP, no serial line" in out
+    assert "load" not in out
+    main(["detect", str(path)])
+    out = capsys.readouterr().out
+    assert "Modbus TCP, no serial line" in out
+    assert "cannot tell" not in out
 
 
 @pytest.mark.parametrize("write", [as_pcap, as_pcapng])
