@@ -135,7 +135,7 @@ _ALL = (
         "the order of one master whose timeout is too short.",
         "two masters on one bus, or a commissioning tool left connected",
         "find the second master; a bus has one, use a gateway or multiplexer for more",
-        explains=(*_OF_COLLISIONS, "MB020", "MB002", "MB003", "MB201", "MB202", "MB302", "LN205"),
+        explains=(*_OF_COLLISIONS, "MB020", "MB002", "MB003", "MB201", "MB202", "MB302", "LN205", "LN303"),
     ),
     Rule(
         "MB204",

@@ -84,7 +84,10 @@ RULES: dict[str, Rule] = {
             "nothing followed, far more than of all commands (chance under 1 in 500).",
             "two masters on one bus, or a commissioning tool beside the controller",
             "find the second master and take it off",
-            explains=("N2004", "N2005", "N2008", "N2010", "N2011", "N2013", "N2014", "N2015", "N2016", "LN1", "LN2"),
+            explains=(
+                *("N2004", "N2005", "N2008", "N2010", "N2011", "N2013", "N2014", "N2015", "N2016"),
+                *("LN1", "LN2", "LN303"),
+            ),
         ),
         Rule(
             "N2008",

@@ -176,3 +176,10 @@ def test_damage_of_the_line_does_not_explain_a_station_that_was_away() -> None:
     _, of_station, of_repeats = with_consequences((found_by(rules["MB007"], "bus", ""), away, repeats), rules)
     assert of_station.cause is None
     assert of_repeats.cause == ("MB003", "station 2")  # its own trouble explains more of it than the bus's
+
+
+@pytest.mark.parametrize("code", ["MB203", "N2007"])
+def test_two_masters_that_only_collide_for_a_while_are_no_other_baud_rate(code: str) -> None:
+    rules = all_rules()
+    made = with_consequences((found_by(rules["LN303"], "bus", ""), found_by(rules[code], "bus", "")), rules)
+    assert made[0].cause == (code, "bus")
