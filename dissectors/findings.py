@@ -259,12 +259,26 @@ def with_consequences(findings: Iterable[Finding], rules: Mapping[str, Rule]) ->
             continue
         codes, there = rules[cause.code].explains, rules[cause.code].explains_there
         for other, finding in enumerate(made):
-            if other == at or finding.cause is not None:
+            if other == at or finding.cause is not None or _has_nearer(finding, cause, made, rules):
                 continue
             is_there = there and finding.count <= cause.count and not set(cause.evidence).isdisjoint(finding.evidence)
             if (codes and _is_explained(finding, cause, codes)) or (is_there and _is_explained(finding, cause, there)):
                 made[other] = as_consequence(finding, cause, rules)
     return from_the_root(_told_once(made, rules), rules)
+
+
+def _has_nearer(finding: Finding, cause: Finding, made: Sequence[Finding], rules: Mapping[str, Rule]) -> bool:
+    """Whether what is found of one station, and may come of what is found of another, may come of its own trouble."""
+    station = finding.about.station
+    if station is None or cause.about.station in (None, station):
+        return False
+    own = (one for one in made if one.about.station == station and one.cause is None and one.code in rules)
+    return any(
+        one.severity >= max(Severity.WARNING, finding.severity)
+        and one is not finding
+        and finding.code.startswith(rules[one.code].explains or ("-",))
+        for one in own
+    )
 
 
 def from_the_root(findings: Iterable[Finding], rules: Mapping[str, Rule]) -> tuple[Finding, ...]:

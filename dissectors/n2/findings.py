@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from dissectors.findings import Finding, Tally
 from dissectors.frame import Damage, Event, Frame, Header, Noise
-from dissectors.late_speakers import Due, LateSpeakers, reaching
+from dissectors.late_speakers import PATIENCE, Due, LateSpeakers, reaching
 from dissectors.line import NS_PER_S, Timing
 from dissectors.n2.clocked import Clocked
 from dissectors.n2.commands import parse_command
@@ -72,6 +72,8 @@ class N2Findings:
         self._answers: OrderedDict[int, bytes] = OrderedDict()  # transaction → its good answer
         self._bad: int | None = None  # the newest damaged answer
         self.turn: int | None = None  # whom the newest command was for
+        self.turned = 0  # when that was, ns
+        self.left: tuple[int, int] | None = None  # whom the newest command to another one was for, and when
         self.is_overdue = False  # an answer may still come, to what closed last
         self._ignores: Callable[[int, str, str], bool] | None = None
 
@@ -108,7 +110,7 @@ class N2Findings:
         if header.ok:
             if placement.destination is not None and placement.destination != self.turn:
                 self.station(placement.destination).turns += 1
-            self.turn = placement.destination
+            self.take_turn(placement.destination, event.start)
         elif last is not None and meant(event) == meant(last.frame) and event.start - last.frame.end < HASTE:
             pass  # an echo that was cut short, and says nothing of who was echoed
         elif event.damage is not Damage.RESTARTED or event.repair is not None:
@@ -118,6 +120,12 @@ class N2Findings:
                 self.masters.see_damaged(last, no, event)
             if counts and gave_up and before in self.stations and event.repair is None:
                 self.stations[before].behind.add(event.start, no)
+
+    def take_turn(self, station: int | None, start: int) -> None:
+        """A command to a station began at `start`."""
+        if self.turn is not None and station != self.turn:
+            self.left = self.turn, self.turned
+        self.turn, self.turned = station, start
 
     def _see_answer(self, no: int, event: Frame, header: Header, placement: Placement) -> None:
         self.masters.see_other()
@@ -174,7 +182,10 @@ class N2Findings:
             if self.torn.is_torn(transaction.of, response) or self.torn.may_answer(response):
                 return  # to what was torn, perhaps
             same = self._answers.get(transaction.id) == self._answers.get(transaction.of or 0)
-            (station.repeated if same else station.twice).add(transaction.start, transaction.response)
+            tally = station.repeated if same else station.twice
+            if not same and self.left is not None and transaction.start - self.left[1] <= PATIENCE:
+                tally = station.beside.setdefault(self.left[0], Tally())
+            tally.add(transaction.start, transaction.response)
         elif verdict is Verdict.LATE:
             if self.torn.may_answer(transaction.response):
                 return  # the command that it answers was torn

@@ -149,7 +149,9 @@ class _Judging:
         judge.newest = int(frames.start[stretch.stop - 1])
         self._see_rhythm(begin, end)
         self._keep_answers(begin, end)
-        judge.turn = int(self.found.unit[end - 1])
+        unit, begun = self.found.unit[which], frames.start[found.request[which]]
+        for at in (*np.flatnonzero(unit[1:] != unit[:-1])[-1:].tolist(), -1):  # before it turned last; the newest
+            judge.take_turn(int(unit[at]), int(begun[at]))
 
     def _see_rhythm(self, begin: int, end: int) -> None:
         """The master's newest turns, which tell whether it has a clock."""

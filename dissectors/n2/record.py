@@ -127,6 +127,7 @@ class N2StationRecord:
     slow: Tally = field(default_factory=Tally)
     again: Tally = field(default_factory=Tally)
     twice: Tally = field(default_factory=Tally)
+    beside: dict[int, Tally] = field(default_factory=dict)  # the same, soon behind commands to that station
     repeated: Tally = field(default_factory=Tally)
     late: Tally = field(default_factory=Tally)
     points: dict[tuple[int, int, int | None], Tally] = field(default_factory=dict)

@@ -94,7 +94,8 @@ RULES: dict[str, Rule] = {
             Severity.ERROR,
             "answered twice",
             "A second, different good answer came to one command that was sent once, sooner than a command that was "
-            "missed at this tap would let one come. A single time it is only noted.",
+            "missed at this tap would let one come; not soon behind commands to a station "
+            "that is late as often, whose answers they may be. A single time it is only noted.",
             "two stations have the same address",
             "switch the station off and see whether something still answers",
             explains=("N2004", "N2011", "N2013", "N2014", "N2016", "LN101", "LN103", "LN2"),
@@ -124,7 +125,7 @@ RULES: dict[str, Rule] = {
             "100 and not surely over two a minute, is only noted.",
             "a master that is not heard at this place of the bus, or a station far slower than the master's timeout",
             "compare the answer times with the master's timeout; move the tap",
-            explains=("N2005", "N2003", "N2015", "LN1", "LN2"),
+            explains=("N2005", "N2003", "N2015", "N2016", "LN1", "LN2"),
         ),
         Rule(
             "N2012",

@@ -71,6 +71,11 @@ class N2Evidence:
         parts = [station.missing.tally(), *([station.unheard.tally()] if self.clocked else [])]
         return together([one for one in parts if one.count] or parts[:1])
 
+    def late_of(self, address: int) -> int:
+        """How many answers of a station came after the master had gone on, as far as that is known."""
+        other = self.stations.get(address)
+        return 0 if other is None else other.late.count + other.slow.count
+
     def unheard(self, station: N2StationRecord) -> Tally:
         """Commands to it whose answer the master had."""
         return Tally() if self.clocked else station.unheard.tally()
@@ -368,10 +373,12 @@ def _overrides(heard: N2Evidence, name: str, station: N2StationRecord) -> Iterat
 
 def _again(heard: N2Evidence, name: str, station: N2StationRecord) -> Iterator[Finding]:
     """Answers that came a second time, or late."""
-    if station.twice.count:
-        seen = f"a second, different answer came to {counted(station.twice.count, 'command')}"
-        finding = station.twice.found(RULES["N2008"], name, seen)
-        yield heard.noted_if(station.twice.count == 1, finding)
+    # an N2 answer names nobody: what came soon behind commands to a station that is late may be that one's
+    own = [tally for other, tally in station.beside.items() if tally.count > heard.late_of(other)]
+    twice = together((station.twice, *own))
+    if twice.count:
+        seen = f"a second, different answer came to {counted(twice.count, 'command')}"
+        yield heard.noted_if(twice.count == 1, twice.found(RULES["N2008"], name, seen))
     if station.repeated.count:
         seen = f"the same answer came again to {counted(station.repeated.count, 'command')}"
         finding = station.repeated.found(RULES["N2013"], name, seen)

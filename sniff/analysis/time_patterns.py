@@ -19,7 +19,7 @@ from dissectors.findings import Finding, Tally, counted, found
 from dissectors.frame import Chunk, Event, Frame, LineError
 from dissectors.line import MS, NS_PER_S
 from dissectors.tracker import Transaction
-from dissectors.words import milliseconds
+from dissectors.words import milliseconds, percent
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.lost_together import LostTogether
 from sniff.analysis.other_settings import Fit, what_fits
@@ -405,6 +405,8 @@ class TimePatterns:
             evidence=tuple(no for one, _ in told for no in one.rows),
         )
         fit = f"; at those times {first.fit.means}" if first.fit is not None else ""
+        if first.fit is None and self._session.adapter.packets is not False:
+            fit = _OR_TWO
         yield replace(finding, means=finding.means + fit)
 
     def _words_of(self, stretch: _Stretch) -> str:
@@ -416,8 +418,15 @@ class TimePatterns:
         if stretch.fit is not None:
             return stretch.fit.seen
         if 3 * stretch.marked >= stretch.octets and stretch.count >= 10:
-            return f"{stretch.marked / stretch.octets:.0%} of them have line errors: another baud rate or format"
+            marked = percent(stretch.marked / stretch.octets, 0)
+            if self._session.adapter.packets is False:
+                return f"{marked} of them have line errors: another baud rate or format"
+            return f"{marked} of them are in reads with line errors: another baud rate or format{_OR_TWO}"
         return ""
+
+
+_OR_TWO = ", or two that talk at once, all the time"
+"""What a flag that covers a whole read cannot tell from another baud rate."""
 
 
 def _is_unreadable(stretch: _Stretch) -> bool:

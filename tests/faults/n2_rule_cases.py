@@ -10,7 +10,7 @@ from dissectors.frame import Chunk
 from dissectors.n2.f510 import POINTS
 from dissectors.n2.simulated import Follower, Master, readings
 from dissectors.simulated import Send, Station
-from dissectors.simulated_faults import BitFlips, DuplicateAddress, Fault, LateResponse
+from dissectors.simulated_faults import BitFlips, DuplicateAddress, Fault, LateResponse, LostResponse
 from sniff.engine.session import Item
 from sniff.simulation.scenarios import Scenario, simulate
 from sniff.simulation.tap import TapModel
@@ -96,6 +96,14 @@ _INNOCENT = ("N2007", "N2008")
 _DRIVE = (("N2012", "station 2"),)
 
 N2_RULE_CASES: tuple[Case, ...] = (
+    Case(
+        "N2 slow station and lost answers of another",
+        partial(n2, (LostResponse(0.1, ("drive 1",)),), delays={2: 260 * MS}),
+        (("N2011", "station 2"), ("N2005", "station 1")),
+        seconds=40,
+        never=("N2008",),
+        seeds=2,
+    ),
     Case(
         "N2 station dies beside noise",
         partial(n2, (BitFlips(0.001),), change={2: partial(Dies, at=10 * S)}),

@@ -183,3 +183,11 @@ def test_two_masters_that_only_collide_for_a_while_are_no_other_baud_rate(code: 
     rules = all_rules()
     made = with_consequences((found_by(rules["LN303"], "bus", ""), found_by(rules[code], "bus", "")), rules)
     assert made[0].cause == (code, "bus")
+
+
+def test_a_late_answer_of_one_n2_station_is_no_second_station_with_the_address_of_the_next() -> None:
+    made = read_capture(FINDINGS / "n2-slow-station-and-lost-answers-of-another.cap.txt").findings
+    assert "N2008" not in {one.code for one in made}
+    assert {one.subject for one in made if one.severity >= Severity.WARNING} == {"station 1", "station 2"}
+    own = [one for one in made if one.code == "N2005"]
+    assert {(one.subject, one.cause) for one in own} == {(who, ("N2011", who)) for who in ("station 1", "station 2")}
