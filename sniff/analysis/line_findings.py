@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
 from dissectors.chances import is_rare
 from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, found, times
-from dissectors.frame import Chunk, Damage, Event, Flaw, Frame, LineError, Noise, Place, Reason, Role
+from dissectors.frame import Chunk, Event, Flaw, Frame, LineError, Noise, Place, Reason, Role
 from dissectors.line import MS, LineSettings
 from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction
@@ -23,7 +23,7 @@ from sniff.analysis.line_use import LineUse
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, lacking_bits, what_fits
 from sniff.analysis.port_presence import PortPresence
 from sniff.analysis.remains import Remains
-from sniff.analysis.sender_findings import BUS, MASTER, MOST_SENDERS, WRONG, Senders
+from sniff.analysis.sender_findings import BUS, MASTER, MOST_SENDERS, WRONG, Senders, sender_of
 from sniff.analysis.stray_findings import strays_found
 from sniff.analysis.time_patterns import Stop, TimePatterns
 from sniff.analysis.torn_pieces import TornPieces
@@ -41,6 +41,9 @@ OUTWEIGHED = 20
 
 MENDED_LEAST = 3
 """So many frames that are good but for one and the same thing are a system, and prove the settings as good ones do."""
+
+MARKED_MANY = 5
+"""One octet in so many has a line error: then it is asked whether the parity is another one."""
 
 COUNTED_OCTETS = 4096
 """Of longer rows the octets are not counted by value."""
@@ -181,7 +184,7 @@ class LineFindings:
 
     def _see_frame(self, row: Row, frame: Frame) -> str:
         """Gives the sender."""
-        sender = _sender(row, self._nouns)
+        sender = sender_of(row, self._nouns)
         role = row.placement.role if row.placement is not None else Role.UNKNOWN
         if role is Role.RESPONSE and not frame.ok and not self._awaiting:
             sender = "bus"  # nobody was asked: it may be anything
@@ -295,10 +298,8 @@ class LineFindings:
     def _of_line(self) -> tuple[Finding, ...]:
         """What may be wrong with a line that can be judged."""
         made: list[Finding] = []
-        if self._senders.are_all_struck() and 10 * self._in_frames >= 8 * self._octets:
-            made.append(self._parity_setting())
-        else:
-            made += self._wrong_octets()
+        parity = self._parity_setting()
+        made += self._wrong_octets() if parity is None else (parity,)
         made += self._of_bus()
         made += self._patterns.findings()
         made += self._use.findings()
@@ -373,12 +374,17 @@ class LineFindings:
         """Whether the bus has no more: its protocol is one of text, and frames were good."""
         return self._good >= MENDED_LEAST and self._is_of_text
 
-    def _parity_setting(self) -> Finding:
-        words = (
-            f"{percent(self._marked / self._octets, 0)} of the octets have parity or framing errors, "
-            f"yet {percent(self._in_frames / self._octets, 0)} are in good frames"
-        )
-        return replace(self._whole("LN004", "bus", words), count=self._marked, is_once=False)
+    def _parity_setting(self) -> Finding | None:
+        """That the port has another parity than the bus, where octets tell it."""
+        words = f"{percent(self._marked / self._octets, 0)} of the octets have parity or framing errors"
+        if self._senders.are_all_struck() and 10 * self._in_frames >= 8 * self._octets:
+            words += f", yet {percent(self._in_frames / self._octets, 0)} are in good frames"
+            return replace(self._whole("LN004", "bus", words), count=self._marked, is_once=False)
+        fit = self._other_settings() if self._marked * MARKED_MANY > self._octets else None
+        if fit is None or not fit.is_parity:
+            return None
+        made = replace(self._whole("LN004", "bus", f"{words}; {fit.seen}"), means=fit.means, next=fit.next)
+        return replace(made, count=self._marked, is_once=False)
 
     def _wrong_octets(self) -> Iterator[Finding]:
         yield from self._senders.wrong_octets(self._note_if)
@@ -407,15 +413,3 @@ class LineFindings:
     def _note_if(self, count: int, of: int) -> Severity | None:
         """A note where so few are not worth a warning."""
         return Severity.NOTE if is_rare(count, of, self._use.heard) else None
-
-
-def _sender(row: Row, nouns: Callable[[str], str]) -> str:
-    """Whose frame it is, as a subject; a damaged header names nobody. `nouns`: for a station, by protocol."""
-    if isinstance(row.event, Frame) and row.event.damage is Damage.HEADER:
-        return "bus"
-    placement, header = row.placement, row.header
-    source = placement.source if placement is not None else header.source if header is not None else None
-    if source is not None:
-        return f"{nouns(header.protocol) if header is not None else 'station'} {source}"
-    role = placement.role if placement is not None else header.role if header is not None else Role.UNKNOWN
-    return "master" if role in (Role.REQUEST, Role.BROADCAST) else "bus"

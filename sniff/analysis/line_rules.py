@@ -81,9 +81,11 @@ _ALL = (
         "parity set differently from the bus",
         "Over 1 in 10 octets of good frames with a parity or framing error (1 in 2 where one flag covers a whole "
         "packet), whoever sends (a sender that is struck far more than the others aside), while at least 8 in 10 "
-        "octets are in good frames. Octets that are no frame do not count: those are somebody else's.",
+        "octets are in good frames. Octets that are no frame do not count: those are somebody else's. Or 1 octet in 5 "
+        "with such an error, exactly those that another parity explains, and without them they read as good frames.",
         "the port listens with another parity than the bus has; frames get through by their check alone",
         "the parity of the bus (8E1, 8O1, 8N1, 8N2), and set it with -s",
+        explains=("PB008", "LN103", "LN204"),
     ),
     Rule(
         "LN005",

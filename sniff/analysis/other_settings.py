@@ -1,8 +1,8 @@
 """Other settings that fit octets which make no frames with those of the capture. Pure, bounded.
 
-Asked is, of a sample: another protocol (every one that the registry knows); seven bits read as eight; fewer data bits
-than the bus has; line ends that a terminal changed; every bit inverted; a bus that is slower or faster. What fits is
-named with its evidence; where nothing does, nothing is named.
+Asked is, of a sample: another parity; another protocol (every one that the registry knows); seven bits read as eight;
+fewer data bits than the bus has; line ends that a terminal changed; every bit inverted; a bus that is slower or faster.
+What fits is named with its evidence; where nothing does, nothing is named.
 """
 
 from __future__ import annotations
@@ -40,12 +40,14 @@ _TEXT = frozenset(b"\r\n\t") | frozenset(range(0x20, 0x7F))
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """Settings that fit: what was seen, what it is consistent with, what to do. `lacks_bits`: octets had more bits."""
+    """Settings that fit: what was seen, what it is consistent with, what to do. `lacks_bits`: octets had more bits;
+    `is_parity`: they are as they should be, but for line errors that another parity of the port would not make."""
 
     seen: str
     means: str
     next: str
     lacks_bits: bool = False
+    is_parity: bool = False
 
 
 def what_fits(
@@ -71,7 +73,10 @@ def other_protocol(sample: Sequence[Chunk], line: LineSettings, latency: int, pr
 def _fits(sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: str, has_rate: bool) -> Iterator[Fit]:
     """The surest first: what reads with good checks, then what the octets themselves exclude."""
     evidence = _evidence(sample, line, latency)
-    if (hint := evidence.hint()) is not None and hint.data_bits == 7 and line.data_bits == 8:
+    hint = evidence.hint()
+    if hint is not None and hint.data_bits == line.data_bits:
+        yield from _by_parity(sample, hint, line, latency)
+    if hint is not None and hint.data_bits == 7 and line.data_bits == 8:
         masked = _changed(sample, 0x7F, 0)
         if (found := _convincing(_evidence(masked, hint, latency))) is not None:
             how = f"with 7 data bits and {'even' if hint.parity == 'E' else 'odd'} parity these octets read"
@@ -91,6 +96,21 @@ def _fits(sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: s
         )
     yield from _by_values(sample, line)
     yield from _by_rate(sample, line, has_rate)
+
+
+def _by_parity(sample: Sequence[Chunk], bus: LineSettings, line: LineSettings, latency: int) -> Iterator[Fit]:
+    """Octets that are right, though a port with another parity than the bus marks them."""
+    plain = [replace(chunk, marks=()) for chunk in sample]
+    if (found := _convincing(_evidence(plain, bus, latency))) is not None:
+        yield replace(
+            _as_protocol(
+                found,
+                "but for their line errors these octets read",
+                f"the bus has {bus}, and the port {line}",
+                f"read it with -s {bus} -p {found.protocol}",
+            ),
+            is_parity=True,
+        )
 
 
 def _by_line_ends(sample: Sequence[Chunk], line: LineSettings, latency: int) -> Iterator[Fit]:

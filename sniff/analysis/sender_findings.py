@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 from dissectors.chances import at_least
 from dissectors.findings import Finding, Severity, Tally, counted, together
-from dissectors.frame import Event, Frame, LineError, Mark, Noise
+from dissectors.frame import Damage, Event, Frame, LineError, Mark, Noise, Role
 from dissectors.line import Timing
 from dissectors.strikes import Strikes
 from dissectors.subject import as_subject
@@ -20,6 +20,7 @@ from sniff.analysis.breaks import Breaks
 from sniff.analysis.flag_runs import FlagRuns
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.shares import UNLIKELY, only_struck, standing_out
+from sniff.engine.engine import Row
 
 WRONG = LineError.PARITY | LineError.FRAMING
 MOST_SENDERS = 600
@@ -331,3 +332,15 @@ def _place(frame: Frame, mark: Mark) -> str:
     if mark.offset >= len(frame.octets) - 1:
         return "at the last octet"
     return "at the first octet" if mark.offset == 0 else "inside"
+
+
+def sender_of(row: Row, nouns: Callable[[str], str]) -> str:
+    """Whose frame it is, as a subject; a damaged header names nobody. `nouns`: for a station, by protocol."""
+    if isinstance(row.event, Frame) and row.event.damage is Damage.HEADER:
+        return "bus"
+    placement, header = row.placement, row.header
+    source = placement.source if placement is not None else header.source if header is not None else None
+    if source is not None:
+        return f"{nouns(header.protocol) if header is not None else 'station'} {source}"
+    role = placement.role if placement is not None else header.role if header is not None else Role.UNKNOWN
+    return "master" if role in (Role.REQUEST, Role.BROADCAST) else "bus"

@@ -11,6 +11,7 @@ from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from dissectors.modbus.envelope import seal_ascii, seal_rtu
 from dissectors.n2.envelope import make_command
+from dissectors.profibus.telegram import telegram
 from sniff.analysis.other_settings import Fit, lacking_bits, what_fits
 from sniff.analysis.slower_bus import slower_by
 from sniff.simulation.collision import low_times, receive
@@ -60,6 +61,24 @@ def test_seven_bits_and_parity_read_as_eight() -> None:
     assert told is not None
     assert "with 7 data bits and even parity these octets read as modbus-ascii" in told.seen
     assert told.means == "the bus has 9600,7E1"
+
+
+@pytest.mark.parametrize("port", ["19200,8O1", "19200,8N1"])
+def test_another_parity_than_the_bus_has_is_named(port: str) -> None:
+    """The octets are right, each with its line error, and a protocol that needs its parity makes no frames of them."""
+    sent, listening = LineSettings.parse("19200,8E1"), LineSettings.parse(port)
+    sample, now = [], 0
+    for turn in range(40):
+        asked, answered = bytes((turn, 0, 23, 112)), bytes((0, turn, 23, 112))
+        for octets in (telegram(8, 2, 0x5D, asked), telegram(2, 8, 0x08, answered)):
+            got = receive(listening, low_times(sent, 0, octets, {}))
+            now += 10 * MS
+            sample.append(Chunk(now, got.octets, got.marks))
+    told = what_fits(sample, listening, 0, "profibus")
+    assert told is not None
+    assert told.is_parity
+    assert "but for their line errors these octets read as profibus" in told.seen
+    assert told.means == f"the bus has 19200,8E1, and the port {port}"
 
 
 def test_inverted_octets() -> None:
