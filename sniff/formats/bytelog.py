@@ -218,6 +218,10 @@ class ByteLog:
             if not table.holds(row) or all(_RULED.fullmatch(cell) for cell in row):
                 self._counts.text += 1
                 continue
+            if found and (more := table.more(row)):
+                found[-1] = replace(found[-1], octets=found[-1].octets + more)
+                self._counts.data += 1
+                continue
             try:
                 told = list(table.chunks(row, char))
                 order.add(told[0].time - len(told[0].octets) * char * table.exact)

@@ -14,8 +14,8 @@ from sniff.formats.log_clock import Stamp
 from sniff.formats.log_lines import Kind, Line, label_of, way_of, without_stamps
 from sniff.formats.log_octets import octets_in
 from sniff.formats.log_pieces import LONGEST, SPACES
-from sniff.formats.log_shapes import COLOURS, STAMP, Role
-from sniff.formats.log_spellings import H2
+from sniff.formats.log_shapes import COLOURS, STAMP, WAYS, Role
+from sniff.formats.log_spellings import CHARACTERS, ENDS, H2, ended
 from sniff.formats.log_times import Times
 
 LEAST = 2
@@ -30,9 +30,10 @@ _SHORT = {
     "0x and digits": re.compile(r"(?<![0-9A-Za-z_])0[xX][0-9A-Fa-f]{1,2}(?![0-9A-Za-z_])"),
     "pairs in brackets": re.compile(rf"\[{H2}\]|<{H2}>|\({H2}\)|\{{{H2}\}}"),
     "digits and h": re.compile(rf"(?<![0-9A-Za-z_]){H2}[hH](?![0-9A-Za-z_])"),
+    CHARACTERS: re.compile(rf"(?<![0-9A-Za-z_])(?:[:>][0-9A-F]+|[AN][0-9A-F]*){ENDS}(?![0-9A-Za-z_])"),
 }
 """Spelling → octets of a line that has few."""
-_SIGNED = frozenset(("0x and digits", "pairs in brackets"))
+_SIGNED = frozenset(("0x and digits", "pairs in brackets", CHARACTERS))
 """Spellings that are octets wherever they stand."""
 _DECIMAL = re.compile(r"(?<![0-9A-Za-z_.])\d{1,3}(?![0-9A-Za-z_])")
 _NUMERAL = re.compile(r"\d+")
@@ -104,6 +105,8 @@ def _short(spelling: str) -> re.Pattern[str]:
 
 def _octets(text: str, spelling: str) -> bytes:
     """Octets of a short run; b"" where it is none."""
+    if spelling == CHARACTERS:
+        return ended(text)
     if spelling.startswith("numbers"):
         return bytes((int(text),)) if int(text) < 256 else b""
     digits = re.sub(r"0[xX]|[^0-9A-Fa-f]", "", text)
@@ -115,7 +118,7 @@ def _outline(spelling: str, text: str, begin: int, end: int, octets: bytes) -> O
 
 
 def _general(text: str) -> str:
-    return " ".join(_NUMERAL.sub("#", text).split())
+    return " ".join(_NUMERAL.sub("#", WAYS.sub("~", text)).split())
 
 
 def _without_characters(tail: str, octets: bytes) -> str:

@@ -301,7 +301,7 @@ def _roles(lines: Sequence[Line], main: str, directed: set[str]) -> dict[str, Ro
             roles[family] = Role.DATA
         elif (
             found >= _REPEATS * many
-            and (octets >= _TELLING * many or many >= _FIXED_LEAST)  # a few are anywhere
+            and (octets >= _TELLING * many or (many >= _FIXED_LEAST and family not in directed))  # a few are anywhere
             and stretches[family] >= min(many, _FIXED_LEAST)  # between the others: a master asks the same for ever
         ):
             roles[family] = Role.SAME

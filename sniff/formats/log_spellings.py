@@ -112,15 +112,26 @@ def _escapes_alone(text: str) -> bytes:
     return _escaped(re.sub(r"(?<=[0-9A-Fa-fabtnvfr\\])[ ,](?=\\)", "", text))
 
 
+CHARACTERS = "frames as characters"
+ENDS = r"(?:<CR>|<LF>|\\r|\\n)*"
+_END = re.compile(r"(?:<CR>|<LF>|\\r|\\n|\r|\n)+$")
+
+
 def _frame_of_characters(text: str) -> bytes:
     """A frame written as its characters, with or without names for its end; its sum must fit."""
-    body = re.sub(r"(?:<CR>|<LF>|\\r|\\n|\r|\n)+$", "", text)
+    body = _END.sub("", text)
     sums = bytes.fromhex(body[1:]) if body[0] == ":" else b""
     if body[0] == ":" and sum(sums) % 256 == 0:
-        return body.encode() + b"\r\n"
+        return ended(text)
     if body[0] == ">" and sum(body[1:-2].encode()) % 256 == int(body[-2:], 16):
-        return body.encode() + b"\r"
+        return ended(text)
     raise ValueError("no frame")
+
+
+def ended(text: str) -> bytes:
+    """A frame written as its characters, with what ends it."""
+    body = _END.sub("", text)
+    return body.encode() + (b"\r\n" if body[0] == ":" else b"\r")
 
 
 def _signed(text: str) -> bytes:
@@ -179,7 +190,7 @@ ESCAPED_STRING = r"(?P<q>['\"])(?=(?:(?!(?P=q))[^\\]|\\[\\'\"]){0,400}\\[x0-7abt
 """How a string in quotes begins that has escapes in it."""
 
 SPELLINGS: tuple[Spelling, ...] = (
-    Spelling("frames as characters", r"(?::(?:[0-9A-F]{2}){3,260}|>[0-9A-F]{4,260})(?:<CR>|<LF>|\\r|\\n)*", None,
+    Spelling(CHARACTERS, rf"(?::(?:[0-9A-F]{{2}}){{3,260}}|>[0-9A-F]{{4,260}}){ENDS}", None,
              _frame_of_characters, 1, before=r"(?<![0-9A-Za-z_#.>])"),
     Spelling("byte strings", rf"(?:b|bytearray\(b)?{ESCAPED_STRING}(?:(?!(?P=q))[^\\]|\\.)*(?P=q)", None, _escaped, 1,
              before=r"(?<![0-9A-Za-z_])", after=""),

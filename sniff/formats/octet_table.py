@@ -107,6 +107,16 @@ class TableLayout:
         except ValueError:
             return False
 
+    def more(self, row: Sequence[str]) -> bytes:
+        """The octets of a row that goes on with those of the row above: it has nothing else; b"" where it does not."""
+        others = (cell for place, cell in enumerate(row) if place != self.octet)
+        if self.exact or self.behind or self.octet >= len(row) or any(map(str.strip, others)):
+            return b""
+        try:
+            return self.read(row[self.octet])
+        except ValueError:
+            return b""
+
     def chunks(self, row: Sequence[str], char: int) -> Iterator[Chunk]:
         """The octets of a row, at their end, of one direction after the other; `char`: ns of a character, where only
         the begin is told.
@@ -268,7 +278,7 @@ _TIME_OF_DAY = re.compile(r"\d{1,2}:\d{2}:\d{2}.*")
 
 def _are_of_days(cells: Sequence[Sequence[str]], day: int, when: int) -> bool:
     """Whether one column has dates and the other times of day."""
-    rows = [row for row in cells if max(day, when) < len(row)]
+    rows = [row for row in cells if max(day, when) < len(row) and (row[day] or row[when])]
     return bool(rows) and all(_DAY.fullmatch(row[day]) and _TIME_OF_DAY.fullmatch(row[when]) for row in rows[:50])
 
 

@@ -69,6 +69,30 @@ def test_all_octets_are_read(kind: str, frames: list[bytes], tmp_path: Path) -> 
     assert log.completeness().whole
 
 
+IN_CHARACTERS: dict[str, Written] = {
+    "names": lambda i, o: f"10:00:{i:02d}.512 {way(i)} {o.decode().replace(chr(13), '<CR>')}\n",
+    "plain": lambda i, o: f"10:00:{i:02d}.512 {way(i)} {o.decode().rstrip()}\n",
+}
+
+
+@pytest.mark.parametrize("kind", IN_CHARACTERS)
+def test_answers_in_characters(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    path.write_text("".join(IN_CHARACTERS[kind](number, frame) for number, frame in enumerate(TEXT * 2)))
+    found = b"".join(item.octets for item in read(path).items() if isinstance(item, Chunk))
+    assert found == b"".join(TEXT * 2)
+
+
+def test_short_messages_with_a_label_of_their_own_repeat_nobody(tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    lines = [
+        f"10:00:00.{i:03d} N2 {way(i)} {'Len=' if len(o) > 2 else 'raw'}: {hx(o)}\n" for i, o in enumerate(TEXT * 4)
+    ]
+    path.write_text("".join(lines))
+    found = b"".join(item.octets for item in read(path).items() if isinstance(item, Chunk))
+    assert found == b"".join(TEXT * 4)
+
+
 TABLES: dict[str, tuple[str, Written]] = {
     "German": (
         "Datum;Zeit;Richtung;Daten\n",
@@ -79,6 +103,14 @@ TABLES: dict[str, tuple[str, Written]] = {
         lambda i, o: f"3/14/2026 11:58:{i:02d}.512 PM,{way(i)},{len(o)},{hx(o)}\n",
     ),
     "name and base": ("Zeit;Daten (hex)\n", lambda i, o: f"2026-03-14 23:58:{i:02d},512;{hx(o)}\n"),
+    "rows that go on": (
+        "Date\tTime\tEvent\tLength\tData\n",
+        lambda i, o: (
+            f"3/14/2026\t11:58:{i:02d}.512 PM\t{way(i)}\t{len(o)}\t"
+            + "\n\t\t\t\t".join(hx(o[at : at + 4]) for at in range(0, len(o), 4))
+            + "\n"
+        ),
+    ),
     "octets in columns": (
         "Timestamp,Data0,Data1,Data2,Data3,Data4,Data5,Data6,Data7,ASCII\n",
         lambda i, o: "".join(
