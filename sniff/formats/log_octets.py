@@ -107,8 +107,13 @@ _NAMED_BY = re.compile(r"[A-Za-z]\w*[ ]?[:=][ ]?$")
 
 def numbers_in(line: str) -> tuple[str, ...]:
     """The tokens of the run of numbers in a line, () when there is none: pairs and others, as they are written."""
-    match = next((one for one in _DIGITS.finditer(line) if len(_TOKEN.findall(one[0])) > 1), None)
-    return tuple(_TOKEN.findall(match[0])) if match is not None else ()
+    runs = ((one["between"], _TOKEN.findall(one[0])) for one in _DIGITS.finditer(line))
+    return next((tuple(run) for between, run in runs if len(run) > 1 and not _is_host(between, run)), ())
+
+
+def _is_host(between: str | None, tokens: list[str]) -> bool:
+    """Whether numbers are an address of a host, or a version."""
+    return between == "." and len(tokens) == 4 and all(_DECIMAL.fullmatch(token) for token in tokens)
 
 
 def _digits(line: str, base: int) -> Run | None:
@@ -131,8 +136,8 @@ def _numbers(line: str, match: re.Match[str], tokens: list[str], base: int) -> R
     if base == PAIRS_ONLY and len(tokens) > SURELY and len(tokens[0]) != 2:
         begin += len(tokens[0]) + len(match["between"])  # the number of the line, or of octets
         tokens = tokens[1:]
-    if match["between"] == "." and len(tokens) == 4 and all(_DECIMAL.fullmatch(token) for token in tokens):
-        return None  # an address of a host, a version
+    if _is_host(match["between"], tokens):
+        return None
     numbers = [_octet(token, base) for token in tokens]
     octets = bytes(number for number in numbers if number is not None)
     sign = (match["between"] or "").strip()

@@ -50,6 +50,7 @@ KINDS: dict[str, Written] = {
     "length ahead": lambda i, o: f"{i}\t10:00:{i:02d}\ta.exe\tIRP_MJ_READ\tSerial0\tSUCCESS\tLength {len(o)}: {hx(o)}\n",
     "characters behind": lambda i, o: f"{i}\t10:00:{i:02d}\tIRP_MJ_READ\tUP\t{hx(o)}\t{shown(o)}\t{len(o)}\t\tCOM3\n",
     "head and dump": lambda i, o: f"[14/03/2026 10:00:{i:02d}] Read data (COM3)\n{dump(o)}",
+    "host ahead": lambda i, o: f"[2026-03-14 10:00:{i:02d}.512]# RECV HEX from 192.168.0.7 :8899>\n{hx(o)} \n\n",
     "packed time": lambda i, o: f"<202603141000{i:02d}.512 {way(i)}>\n{hx(o)}\n",
     "digits behind a comma": lambda i, o: f"2026/03/14 10:00:{i:02d},{o.hex().upper()}\n",
     "colons": lambda i, o: f"[10:00:{i:02d}.512][D][uart_debug:114]: {'>>>' if i % 2 else '<<<'} {hx(o, ':')}\n",
