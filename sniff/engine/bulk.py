@@ -183,11 +183,8 @@ class BulkEngine:
 
 
 def _of_outputs(engine: SessionEngine, outputs: list[Output]) -> Table:
-    """As a table; what a change of the settings completes was heard before it, and is of the protocol of then."""
     first = next((output.rows[0].no for output in outputs if output.rows), engine.engine.next)
-    frames = (row.event for output in outputs for row in output.rows if isinstance(row.event, Frame))
-    spoken = next((frame.protocol for frame in frames), engine.dissector.name)
-    return Table.of_outputs(spoken, first, outputs)
+    return Table.of_outputs(engine.dissector.name, first, outputs)
 
 
 class _Leg:

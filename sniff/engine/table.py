@@ -93,8 +93,11 @@ class Table:
 
     @classmethod
     def of_outputs(cls, protocol: str, first: int, outputs: Iterable[Output]) -> Table:
-        """What an engine gave, output by output."""
+        """What an engine gave, output by output. `protocol`: where no frame says it; what a change of the settings
+        completes was heard before it, and is of the protocol of then."""
         whole = together(outputs)
+        frames = (row.event for row in whole.rows if isinstance(row.event, Frame))
+        protocol = next((frame.protocol for frame in frames), protocol)
         least = 0 if whole.rows else -1  # what closed before any row came goes with the first
         closed_by = [max(place, least) for place in whole.closed_by]
         return cls.of(protocol, first, whole.rows, whole.transactions, closed_by)

@@ -8,10 +8,9 @@ from itertools import pairwise
 
 import pytest
 
-from dissectors.frame import Chunk
 from sniff.bus.offline import outputs
 from sniff.engine import late_columns, late_reads
-from sniff.engine.blocks import Block, reads_of
+from sniff.engine.blocks import Block
 from sniff.engine.bulk import BulkEngine
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import SessionEngine
@@ -67,17 +66,6 @@ def test_columns_go_on_when_the_clock_does(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(SessionEngine, "take", None)
     made += [engine.take(block.cut(begin, begin + AT_ONCE)) for begin in range(450, 900, AT_ONCE)]
     assert sum(map(len, made)) > 890
-
-
-def test_what_new_settings_complete_is_of_the_protocol_before() -> None:
-    session, reads = _mstp(0.0)
-    (chunk, *_) = Block(reads).chunks(0, 1)
-    other, back = (LineEvent(chunk.time, LineEventKind.SETTINGS, f"protocol={name}") for name in ("modbus-rtu", "mstp"))
-    request = Chunk(chunk.time, bytes.fromhex("01 03 00 00 00 02 C4 0B"))
-    engine = BulkEngine(session)
-    parts: list[Block | LineEvent] = [other, Block(reads_of([request])), back, Block(reads_of([chunk]))]
-    (row, *_) = _rows([engine.take(one) for one in parts])
-    assert (row.event.protocol, row.header.protocol) == ("modbus-rtu", "modbus-rtu")  # type: ignore[union-attr]
 
 
 def _rows(made: list[Table]) -> list[Row]:
