@@ -62,7 +62,7 @@ def brief(case: Case) -> Case:
         return case if not case.name.startswith(RING) else replace(case, seconds=20)
     if any(word in case.name for word in BIT_BY_BIT):
         return replace(case, seconds=5)
-    return replace(case, seconds=10 if case.name.startswith((*RING, DRIVE)) else 30)
+    return replace(case, seconds=min(case.seconds, 10 if case.name.startswith((*RING, DRIVE)) else 30))
 
 
 def brief_clean() -> list[Case]:
