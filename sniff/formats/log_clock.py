@@ -165,8 +165,8 @@ def _clock(pattern: str) -> re.Pattern[str]:
 
 
 CLOCKS: tuple[Clock, ...] = (
-    Clock("date and time", _clock(rf"(?P<date>\d{{1,4}}[-./]\d{{1,2}}[-./]\d{{1,4}})(?:[ T_:-]|, ?| +){_TIME}"
-                                  r"(?P<zone>Z| ?[+-]\d\d:?\d\d(?![\d.]))?"), _dated, dated=True),
+    Clock("date and time", _clock(rf"(?P<date>\d{{1,4}}[-./]\d{{1,2}}[-./]\d{{1,4}})(?:[ Tt_:-]|, ?| +){_TIME}"
+                                  r"(?P<zone>[Zz]| ?[+-]\d\d:?\d\d(?![\d.]))?"), _dated, dated=True),
     Clock("day, month by name, year and time", _clock(rf"(?P<day>\d{{1,2}})[-/ ]{_MONTH}[-/ ]"
                                                                rf"(?P<year>\d{{4}})[ ,T:]+{_TIME}"
                                                                r"(?P<zone>Z| ?[+-]\d\d:?\d\d(?![\d.]))?"),

@@ -43,6 +43,7 @@ DATED: dict[str, Callable[[dates.datetime], str]] = {
     "zone behind a space": lambda when: f"{of_zone(when, 5.5)} +0530",
     "minus between": lambda when: f"{when:%Y/%m/%d-%H:%M:%S}.{parts(when)}",
     "server of the web": lambda when: f"{when:%d/%b/%Y:%H:%M:%S}.{parts(when)} +0000",
+    "small letters": lambda when: f"{when:%Y-%m-%dt%H:%M:%S}.{parts(when)}z",
     "Chinese": lambda when: f"{when.year}年{when.month}月{when.day}日 {when:%H:%M:%S}.{parts(when)}",
     "without signs": lambda when: f"{when:%Y%m%d%H%M%S}{parts(when)}",
 }
