@@ -12,6 +12,7 @@ from dissectors.bacnet.frame_types import EXPECTING
 from dissectors.bacnet.limits import BROADCAST, MS
 from dissectors.bacnet.open_exchanges import OpenExchanges
 from dissectors.frame import Assembly, Frame, Header, Role
+from dissectors.line import Timing
 from dissectors.tracker import Placement, Transaction, Verdict
 
 TWICE_WITHIN = 2_000 * MS
@@ -24,8 +25,8 @@ _ENDED = frozenset(Verdict) - {Verdict.NO_RESPONSE, Verdict.DAMAGED_ANSWER}
 class DataExchanges(OpenExchanges):
     """What data do to exchanges."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
         self._assembly: Assembly | None = None  # what the newest frame ended
 
     def _data(self, no: int, frame: Frame, header: Header, closed: list[Transaction]) -> Placement:

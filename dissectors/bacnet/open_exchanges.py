@@ -7,6 +7,7 @@ from collections import OrderedDict
 from dissectors.bacnet.exchange import Exchange, Key
 from dissectors.bacnet.limits import MS, T_NO_TOKEN
 from dissectors.frame import Frame, Header
+from dissectors.line import Timing
 from dissectors.tracker import Transaction, Verdict
 
 POSTPONED_FOR = 10_000 * MS
@@ -22,7 +23,9 @@ REMEMBERED = 256
 class OpenExchanges:
     """One exchange may hold the bus; others wait for an answer that comes later; the last that are over are known."""
 
-    def __init__(self) -> None:
+    def __init__(self, timing: Timing) -> None:
+        unmeasured = 0 if timing.has_times else timing.latency  # a line of a log takes longer than its octets did
+        self._gives_up_after = T_NO_TOKEN + unmeasured
         self._next = 1  # id of the next transaction
         self._waiting: Exchange | None = None  # holds the bus: an answer must come now
         self._postponed: OrderedDict[Key, Exchange] = OrderedDict()
@@ -72,13 +75,13 @@ class OpenExchanges:
     def _expire(self, now: int) -> list[Transaction]:
         """What is over by `now`, in the order in which its time was up: whoever asks in between gets the same order."""
         closed: list[Transaction] = []
-        waiting = self._waiting
+        waiting, wait = self._waiting, self._gives_up_after
         over = [
             (exchange.last + (SEGMENTS_FOR if exchange.segmented else POSTPONED_FOR), key)
             for key, exchange in self._postponed.items()
             if now - exchange.last >= (SEGMENTS_FOR if exchange.segmented else POSTPONED_FOR)
         ]
-        until = None if waiting is None or now - waiting.last < T_NO_TOKEN else waiting.last + T_NO_TOKEN
+        until = None if waiting is None or now - waiting.last < wait else waiting.last + wait
         if len(over) > 1:
             over.sort(key=lambda one: one[0])
         for due, key in over:

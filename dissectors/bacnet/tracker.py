@@ -66,7 +66,7 @@ class MstpTracker(DataExchanges):
     """The tracker of one MS/TP bus; `dissectors.tracker` has the contract."""
 
     def __init__(self, timing: Timing) -> None:
-        super().__init__()
+        super().__init__(timing)
         self._latency = timing.latency
         self._under_way = 2 * timing.latency + total(MAX_ENCODED) * timing.char
         self._turnaround = timing.line.bits(TURNAROUND_BITS)

@@ -41,9 +41,11 @@ class _Station:
 
 
 class LostTogether:
-    """Fed the transactions of one bus; `findings` may be asked at any time."""
+    """Fed the transactions of one bus; `findings` may be asked at any time. `has_times`: false of a log without them,
+    of which no moment is told."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, has_times: bool = True) -> None:
+        self._has_times = has_times
         self._stations: dict[int, _Station] = {}
 
     def settle(self, transaction: Transaction) -> None:
@@ -142,14 +144,14 @@ class LostTogether:
         others = [one for number, one in self._stations.items() if number not in names and one.last_answer > moment]
         who = "all of them" if not others else f"{counted(len(others), 'other station')} went on"
         window = max(loss[1] for loss in together) - min(loss[0] for loss in together)
-        when = "at the same moment" if window < MOMENT else f"within {duration(window)}"
-        seen = (
-            f"{len(names)} stations ({', '.join(map(str, names))}) stopped answering {when}, "
-            f"{(moment - first) / NS_PER_S:.1f} s after the begin: {who}"
-        )
+        is_one = window < MOMENT or not self._has_times
+        when = "at the same moment" if is_one else f"within {duration(window)}"
+        when += f", {(moment - first) / NS_PER_S:.1f} s after the begin" if self._has_times else ""
+        seen = f"{len(names)} stations ({', '.join(map(str, names))}) stopped answering {when}: {who}"
         back = [loss[2] for loss in together if loss[2]]
         if len(back) == len(together):
-            seen += f"; they were back after {(max(back) - moment) / NS_PER_S:.1f} s"
+            after = f" after {(max(back) - moment) / NS_PER_S:.1f} s" if self._has_times else ""
+            seen += f"; they were back{after}"
         severity = Severity.WARNING if back else Severity.ERROR
         finding = tally.found(RULES["LN305"], "bus", seen, severity)
         return replace(finding, count=len(names), stations=tuple(names), lasts=len(back) < len(together))

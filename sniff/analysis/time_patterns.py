@@ -132,7 +132,7 @@ class TimePatterns:
         self._stretch: _Stretch | None = None
         self._stretches: list[_Stretch] = []
         self._silences = Silences()
-        self._lost = LostTogether()
+        self._lost = LostTogether(has_times=session.has_times)
 
     # ---- taking in
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dissectors.bacnet.envelope import npdu_frame
 from dissectors.bacnet.ring_events import RingEventKind
+from dissectors.tracker import Verdict
 from tests.dissectors.bacnet.ring_script import Step, data, found, poll, rounds, script, token
 
 READ = "010400030 10c0c020004d2194d".replace(" ", "")
@@ -45,3 +47,13 @@ def test_no_shares_of_time_and_no_durations_are_told():
     untold = script(_timeless(steps), LATENCY, has_times=False)
     assert "of the time" not in untold.of("MS201").seen
     assert not any(one.code in ("MS108", "MS601", "MS603") for one in untold.findings)
+
+
+def test_an_answer_that_fills_a_long_line_is_not_late():
+    """A log lays its lines further apart than their octets last: 0.8 s for an extended frame."""
+    answer = npdu_frame(1, 7, bytes.fromhex("010030010c0c020004d2191c3e75fe02bc00") + bytes(700) + b"\x3f", False)
+    steps = rounds(5, 1, 7)
+    for _ in range(6):
+        steps += [(20, data(1, 7, READ, expects=True)), (650, answer), (20, token(1, 7)), (20, token(7, 1))]
+    read = script(steps, 850, has_times=False)
+    assert [one.verdict for one in read.transactions if one.kind == "read-property"] == [Verdict.ANSWERED] * 6

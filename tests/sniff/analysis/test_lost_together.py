@@ -61,3 +61,13 @@ def test_what_was_lost_while_nobody_heard_is_not_of_one_moment() -> None:
             together.settle(asked(station, second + station / 10, second < 30))
     (finding,) = together.findings(0, 3000 * S)
     assert finding.seen.startswith("3 stations (1, 2, 3) stopped answering within 121 s, ")
+
+
+def test_of_a_log_without_times_no_moment_is_told() -> None:
+    together = LostTogether(has_times=False)
+    for second in range(60):
+        for station in (1, 2, 3):
+            together.settle(asked(station, second + station / 10, station == 3 or not 30 <= second < 40))
+    (finding,) = together.findings(0, 60 * S)
+    assert finding.seen.startswith("2 stations (1, 2) stopped answering at the same moment: 1 other station went on")
+    assert finding.seen.endswith("they were back")
