@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from sniff.engine.session import Adapter, Completeness, Item, LineEvent, Session
 from sniff.formats.records import PacketRecord, foreign_session
+from sniff.formats.set_back_clock import steady
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
@@ -48,7 +49,7 @@ class PacketBus:
 
     def items(self) -> Iterator[Item]:
         """What all ends said, in order of time. Raises CaptureError."""
-        return self._reader(self._file.records())
+        return steady(self._reader(self._file.records()), self.session.timing.char)
 
     def blocks(self) -> Iterator[Block | LineEvent]:
         """The same as columns. Raises CaptureError."""

@@ -27,6 +27,7 @@ from sniff.formats.records import (
     items_of,
     protocol_of,
 )
+from sniff.formats.set_back_clock import steady, steady_pieces
 from sniff.formats.usb import USB
 
 if TYPE_CHECKING:
@@ -103,6 +104,9 @@ class PcapCapture:
 
     def items(self) -> Iterator[Item]:
         """Chunks in the order of the file."""
+        return steady(self._items(), self.session.timing.char)
+
+    def _items(self) -> Iterator[Item]:
         with open_capture(self.path) as stream:
             stream.seek(FILE_HEADER)
             protocol = self.session.protocol
@@ -120,7 +124,7 @@ class PcapCapture:
         """The same as columns, without an object a record."""
         from sniff.engine.blocks import blocks_of
 
-        return blocks_of(self._pieces())
+        return blocks_of(steady_pieces(self._pieces(), self.session.timing.char))
 
     def completeness(self) -> Completeness:
         """Whether the last record was whole, as far as `items` has read."""

@@ -33,6 +33,7 @@ from sniff.formats.pcapng_packet import (
     packet_of,
 )
 from sniff.formats.records import PacketRecord, SearchMarks, foreign_session, items_of, protocol_of
+from sniff.formats.set_back_clock import steady, steady_pieces
 from sniff.formats.timeless import IN_PACKETS, Laid
 from sniff.formats.usb import USB
 
@@ -128,6 +129,9 @@ class PcapngCapture:
 
     def items(self) -> Iterator[Item]:
         """Chunks in the order of the file."""
+        return steady(self._all_items(), self.session.timing.char)
+
+    def _all_items(self) -> Iterator[Item]:
         self._other = 0
         marks = SearchMarks(self.session)
         with open_capture(self.path) as stream:
@@ -139,7 +143,7 @@ class PcapngCapture:
         """The same as columns, without an object a packet but in a search."""
         from sniff.engine.blocks import blocks_of
 
-        return blocks_of(self._pieces())
+        return blocks_of(steady_pieces(self._pieces(), self.session.timing.char))
 
     def completeness(self) -> Completeness:
         """Whether the last block was whole, as far as `items` has read."""
