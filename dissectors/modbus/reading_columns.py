@@ -31,7 +31,7 @@ def reading_columns(asked: FrameColumns, answered: FrameColumns, has_answer: Mas
     function, first, second = at(begin + 1), word(begin + 2), word(begin + 4)
     same = (answer_size >= 2) & (at(back) == at(begin)) & (at(back + 1) == function)
     read = has_answer & same & np.isin(function, (3, 4)) & (answer_size >= 3)
-    read &= (at(back + 2) == 2 * second) & (answer_size - 3 >= 2 * second)
+    read &= (at(back + 2) == 2 * second) & (answer_size - 3 == 2 * second)
     confirmed = ~has_answer | same
     single = confirmed & (function == 6)
     many = confirmed & (function == 16) & (size > _HEAD) & (at(begin + 6) == 2 * second) & (size - 7 == 2 * second)

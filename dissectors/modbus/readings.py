@@ -33,12 +33,12 @@ def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ..
         return _written(asked)
     at, bits = ITEMS_ASKED[asked[1]]
     space, begin, count = MESSAGES[asked[1]].space, _word(asked, at - 2), _word(asked, at)
-    if bits == 1:
-        return _bits(space, begin, count, answer[3 : 3 + answer[2]] if answer[2:] else b"")
     octets = answer[3:]
-    if len(octets) < 2 * count or not answer[2:] or answer[2] != 2 * count:
+    if not answer[2:] or len(octets) != answer[2]:  # as long as it says itself, or nobody knows which octet is which
         return ()
-    return (*_written(asked), *_registers(space, begin, octets[: 2 * count], Origin.READ))
+    if bits == 1:
+        return _bits(space, begin, count, octets)
+    return (*_written(asked), *_registers(space, begin, octets, Origin.READ)) if len(octets) == 2 * count else ()
 
 
 def asks(frame: Frame) -> tuple[Reading, ...]:
