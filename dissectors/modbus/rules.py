@@ -81,8 +81,8 @@ _ALL = (
         "the station answers when its master has given up; those whose frames are hit are not to blame",
         "raise the master's response timeout, or find out why this station is slow; nobody else's cable",
         explains=(
-            *("MB001", "MB002", "MB003", "MB004", "MB005", "MB007", "MB009", "MB010", "MB019", "MB103", "MB104"),
-            *("MB101", "MB105", "MB207", "MB208", *_OF_LINE),
+            *("MB001", "MB002", "MB003", "MB004", "MB005", "MB006", "MB007", "MB009", "MB010", "MB012", "MB019"),
+            *("MB101", "MB103", "MB104", "MB105", "MB207", "MB208", *_OF_LINE),
         ),
     ),
     Rule(
@@ -95,8 +95,8 @@ _ALL = (
         "the master's response timeout is shorter than its stations need; late answers fall on what it sends next",
         "raise the master's response timeout above the slowest answer, with room; then look at what is left",
         explains=(
-            *("MB002", "MB005", "MB007", "MB009", "MB010", "MB020", "MB022", "MB101", "MB103", "MB104", "MB106"),
-            *("MB201", "MB206", "MB207", "MB208", "MB301", "LN205", "LN303", *_OF_LINE),
+            *("MB002", "MB005", "MB006", "MB007", "MB009", "MB010", "MB012", "MB020", "MB022", "MB101", "MB103"),
+            *("MB104", "MB106", "MB201", "MB206", "MB207", "MB208", "MB301", "LN205", "LN303", *_OF_LINE),
         ),
     ),
     Rule(

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, together
-from dissectors.late_speakers import MASTER, NOBODY, Heard, Window, is_behind, late_speakers, told
+from dissectors.impatience import impatience, window
+from dissectors.late_speakers import MASTER, NOBODY, Heard, is_behind, late_speakers, told
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.finding_words import note_if, units
 from dissectors.modbus.rules import RULES
@@ -15,18 +16,14 @@ from dissectors.perhaps_late import perhaps_late
 from dissectors.words import fine_milliseconds
 
 _OUTLASTING_LEAST = 3
-_HEARD = 3  # answers from which on a station counts among those that are there
-_LATE, _STATIONS = 3, 2  # late answers, and stations that give them, from which on it is the master that hardly waits
 _SEEN_LATE = 3  # late answers from which on no damage is needed to show it
-_EACH = 3  # frames that one answer damages at most
-_NOTHING = Window()
 
 
 def of_late_speakers(seen: BusRecord) -> Iterator[Finding]:
     """Stations that answer into what follows: those that are hit are not to blame for their damage."""
     whole = {f"station {unit}": one.answered for unit, one in seen.stations.items()}
     whole[MASTER] = whole[NOBODY] = seen.requests - seen.damaged_requests.count
-    heard = {unit: Heard(one.answered, one.late.count, one.missing.count) for unit, one in seen.stations.items()}
+    heard = _heard(seen)
     named: set[int] = set()
     for one in late_speakers(seen.late_speakers, whole, heard):
         hit = one.stations_hit
@@ -53,24 +50,19 @@ def of_late_speakers(seen: BusRecord) -> Iterator[Finding]:
 
 def of_impatience(seen: BusRecord, timeout: int | None) -> Iterator[Finding]:
     """A master that gives up before most of its stations answer. `timeout`: its own, ns, None while unlearnt."""
-    there = {unit: one for unit, one in seen.stations.items() if one.answered + one.late.count >= _HEARD}
-    late = {unit: one for unit, one in there.items() if one.late.count}
-    count = sum(one.late.count for one in late.values())
-    shown = {unit: one.late.count + _hits(_window(seen, unit)) for unit, one in there.items()}
-    is_one = 2 * sum(shown.values()) < 3 * max(shown.values(), default=0)  # and hardly anybody else
-    if len(late) < _STATIONS or count < _LATE or is_one:
+    shown = impatience(seen.late_speakers, _heard(seen))
+    if shown is None:
         return
-    waited = {unit: there[unit] for unit, often in shown.items() if often}
-    damaged, overdue = _damaged(seen), seen.late_speakers.overdue
-    in_vain = count + sum(one.missing.count for one in waited.values())
-    if 2 * len(waited) < len(there) or 4 * overdue < 3 * damaged or damaged > _EACH * in_vain:
-        return
-    words = f"{counted(count, 'answer')} of {units(late)} came after the master had given up"
+    words = f"{counted(shown.answers, 'answer')} of {units(shown.late)} came after the master had given up"
     words += f"; it waits {fine_milliseconds(timeout)}" if timeout is not None else ""
-    if damaged:
-        words += f"; {overdue} of {counted(damaged, 'damaged frame')} stand where an answer was overdue"
-    tally = together(one.late for one in late.values())
-    yield tally.found(RULES["MB107"], MASTER, words, note_if(seen.rare(in_vain, seen.requests)))
+    if shown.damaged:
+        words += f"; {shown.overdue} of {counted(shown.damaged, 'damaged frame')} stand where an answer was overdue"
+    tally = together(seen.stations[unit].late for unit in shown.late)
+    yield tally.found(RULES["MB107"], MASTER, words, note_if(seen.rare(shown.in_vain, seen.requests)))
+
+
+def _heard(seen: BusRecord) -> dict[int, Heard]:
+    return {unit: Heard(one.answered, one.late.count, one.missing.count) for unit, one in seen.stations.items()}
 
 
 def under_late_answers(made: Sequence[Finding], seen: BusRecord) -> Iterator[Finding]:
@@ -101,37 +93,28 @@ def _who_was_late(one: Finding, late: dict[int, StationRecord], seen: BusRecord)
     if unit is None:
         return None
     if unit in late:
-        window, own = _window(seen, unit), late[unit]
-        return unit if one.count <= 2 * (own.late.count + window.damage.count + window.own) else None
-    silent = (other for other in late if 4 * _window(seen, other).silenced[unit] >= 3 * one.count)
+        due, own = window(seen.late_speakers, unit), late[unit]
+        return unit if one.count <= 2 * (own.late.count + due.damage.count + due.own) else None
+    silent = (other for other in late if 4 * window(seen.late_speakers, other).silenced[unit] >= 3 * one.count)
     return next(silent, None)
 
 
 def _directly_behind(seen: BusRecord, unit: int, station: StationRecord) -> tuple[Tally, str]:
     """The damage that stands directly behind waits for a station in vain, and no chance does it: requests, or those and
     its own answers to repeats, of one that was seen to be late; none, and no words, of all others."""
-    window, silent = _window(seen, unit), station.missing.count + station.late.count
+    due, silent = window(seen.late_speakers, unit), station.missing.count + station.late.count
     damaged = seen.late_speakers.damaged[MASTER]
-    if station.answered and is_behind(window.behind.count, damaged, silent, seen.requests):
-        return window.behind, f"{window.behind.count} of {counted(damaged, 'damaged request')}"
+    if station.answered and is_behind(due.behind.count, damaged, silent, seen.requests):
+        return due.behind, f"{due.behind.count} of {counted(damaged, 'damaged request')}"
     if not 0 < station.late.count < _SEEN_LATE:
         return Tally(), ""
-    own, of = window.own_behind, seen.late_speakers.damaged[f"station {unit}"]
+    own, of = due.own_behind, seen.late_speakers.damaged[f"station {unit}"]
     if is_behind(own.count, of, silent, station.asked, is_late=True):
         return own, f"{own.count} of its {counted(of, 'damaged answer')}"
-    both, of = together((window.behind, own)), of + damaged
+    both, of = together((due.behind, own)), of + damaged
     if is_behind(both.count, of, silent, station.asked, is_late=True):
         return both, f"{both.count} of {counted(of, 'damaged frame')} of the master and itself"
     return Tally(), ""
-
-
-def _window(seen: BusRecord, unit: int) -> Window:
-    return seen.late_speakers.windows.get(unit, _NOTHING)
-
-
-def _hits(window: Window) -> int:
-    """How often damage stood directly behind a wait for a station, or showed that it spoke."""
-    return window.behind.count + window.own_behind.count + window.shown.total()
 
 
 def _damaged(seen: BusRecord) -> int:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from dissectors.chances import is_rare
-from dissectors.findings import Finding, counted
+from dissectors.findings import Finding, Severity, counted, together
+from dissectors.impatience import impatience
 from dissectors.late_speakers import MASTER, NOBODY, Heard, LateSpeakers, is_behind, late_speakers, told
 from dissectors.n2.record import N2StationRecord
 from dissectors.n2.rules import RULES
@@ -32,9 +33,24 @@ def of_late_speakers(heard: N2Evidence, late: LateSpeakers) -> Iterator[Finding]
             seen += "a command to it that nothing had followed"
             told_of.add(address)
             yield station.behind.found(RULES["N2014"], f"station {address}", seen)
+    yield from _of_impatience(heard, late, known)
     perhaps = perhaps_late(late, whole, known) if not told_of else None
     if perhaps is not None and not is_rare(perhaps.struck, perhaps.of + perhaps.of_elsewhere, heard.span):
         yield perhaps.told_of(RULES["N2014"])
+
+
+def _of_impatience(heard: N2Evidence, late: LateSpeakers, known: Mapping[int, Heard]) -> Iterator[Finding]:
+    """A master that gives up before most of its stations answer."""
+    shown = impatience(late, known)
+    if shown is None:
+        return
+    stations = ", ".join(map(str, shown.late))
+    seen = f"{counted(shown.answers, 'answer')} of stations {stations} came after the master had gone on"
+    if shown.damaged:
+        seen += f"; {shown.overdue} of {counted(shown.damaged, 'damaged frame')} stand where an answer was overdue"
+    tally = together(heard.stations[address].late for address in shown.late)
+    severity = Severity.NOTE if is_rare(shown.in_vain, heard.master.frames, heard.span) else None
+    yield tally.found(RULES["N2017"], MASTER, seen, severity)
 
 
 def _is_behind(heard: N2Evidence, station: N2StationRecord) -> bool:

@@ -85,7 +85,7 @@ RULES: dict[str, Rule] = {
             "two masters on one bus, or a commissioning tool beside the controller",
             "find the second master and take it off",
             explains=(
-                *("N2004", "N2005", "N2008", "N2010", "N2011", "N2013", "N2014", "N2015", "N2016"),
+                *("N2004", "N2005", "N2008", "N2010", "N2011", "N2013", "N2014", "N2015", "N2016", "N2017"),
                 *("LN1", "LN2", "LN303"),
             ),
         ),
@@ -166,7 +166,7 @@ RULES: dict[str, Rule] = {
             "nobody named.",
             "the station answers when its master has given up; those whose frames are hit are not to blame",
             "raise the message timeout of the master, or find out why this station is slow; nobody else's cable",
-            explains=("N2003", "N2004", "N2005", "N2006", "N2011", "LN1", "LN2"),
+            explains=("N2003", "N2004", "N2005", "N2006", "N2011", "N2012", "LN1", "LN2"),
         ),
         Rule(
             "N2015",
@@ -193,6 +193,20 @@ RULES: dict[str, Rule] = {
             "a fault in the program of the device, or a master and a station that are out of step, so that one "
             "takes the answer to another command",
             "what the master shows for these points; the device's list of points",
+        ),
+        Rule(
+            "N2017",
+            Severity.WARNING,
+            "master gives up too soon",
+            "Good answers of two stations or more that come when the master has gone on, three at least; where half of "
+            "the stations answer late or have damage directly behind waits for them in vain, 1 in 3 times not the same "
+            "one; and where 3 in 4 damaged frames, if any are, stand while an answer is overdue.",
+            "the master's message timeout is shorter than its stations need; late answers fall on what it sends next",
+            "raise the master's message timeout above the slowest answer, with room; then look at what is left",
+            explains=(
+                *("N2003", "N2004", "N2005", "N2006", "N2010", "N2011", "N2012", "N2013", "N2014", "N2015", "N2016"),
+                *("LN1", "LN2", "LN303"),
+            ),
         ),
     )
 }

@@ -16,7 +16,7 @@ MS = 1_000_000
 
 _FOUR = (1, 2, 3, 4)
 _late = (Said(("station 2",), ("MB106", "N2014")),)
-_impatient = (Said(("master",), ("MB107",)),)
+_impatient = (Said(("master",), ("MB107", "N2017")),)
 _late_or_unasked = (Said(("station 2",), ("N2014", "N2011")),)
 
 
@@ -73,6 +73,14 @@ _ALL = Modbus(
 )
 """Every station is late now and then: it is the master that does not wait."""
 
+_ALL_OF_N2 = N2(
+    partial(by_turns, 1, 2, 3, 4, count=2),
+    {f"drive {unit}": partial(follower, unit, (10 + unit) * MS, few=True) for unit in _FOUR},
+    pause=15 * MS,
+    timeout=200 * MS,
+    faults=(LateResponse(0.2, 195 * MS, tuple(f"drive {unit}" for unit in _FOUR)),),
+)
+
 LATE_CASES: tuple[Case, ...] = (
     _case("RTU answers into the next station, no repeats", _bus(240, retries=0)),
     _case("N2 answers into the next station", _n2(250, 15)),
@@ -93,6 +101,7 @@ FURTHER_LATE_CASES: tuple[Case, ...] = (
     _case("RTU answers into the next station", _bus(232)),
     Case("N2 answers into the next station, FTDI", _n2(225, 30), _late_or_unasked, FTDI, seeds=1, struck=("bus",)),
     Case("RTU all answer late", _ALL, _impatient, seeds=1, struck=("bus",)),
+    Case("N2 all answer late", _ALL_OF_N2, _impatient, seeds=1, struck=("bus",)),
     Case("RTU all answer late, FTDI", _ALL, _impatient, FTDI, seeds=1, struck=("bus",)),
     _case("RTU answers one request late", _bus(228, retries=2, pause=5)),
     _case("RTU answers into the next station, FTDI", _bus(236), FTDI),
