@@ -287,6 +287,9 @@ class _Work:
                 replace(m, offset=m.offset - at + begin) for m in marks if at - begin <= m.offset < end - begin
             )
         time = int(reads.times[index]) - (whole - end) * self._framing._timing.char
+        before = int(reads.times[index - 1]) if index else reads.before
+        if end < whole and before is not None:  # it came since the read before, however many octets it holds
+            time = max(time, before)
         return Chunk(time, reads.octets[at:end].tobytes(), marks), end
 
     def _end_events(self) -> None:

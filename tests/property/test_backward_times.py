@@ -8,9 +8,10 @@ from itertools import pairwise
 
 import pytest
 
+from dissectors.frame import Chunk
 from sniff.bus.offline import outputs
 from sniff.engine import late_columns, late_reads
-from sniff.engine.blocks import Block
+from sniff.engine.blocks import Block, reads_of
 from sniff.engine.bulk import BulkEngine
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import SessionEngine
@@ -52,6 +53,18 @@ def test_the_same_rows(bus: Bus, seed: int) -> None:
     assert _rows(made) == [row for one in expected for row in one.rows]
     closed = [table.transaction(place) for table in made for place in range(len(table.transactions))]
     assert closed == [one for output in expected for one in output.transactions]
+
+
+def test_reads_that_hold_more_than_can_have_come_give_the_same_rows() -> None:
+    """A chain that ends within such a read: what stands behind it came since the read before, as all of it did."""
+    session, reads = _mstp(0.0, many=300)
+    octets = reads.octets[: len(reads.octets) // 668 * 668].reshape(-1, 668).tobytes()
+    chunks = [Chunk(10**9, octets[at : at + 668]) for at in range(0, len(octets), 668)]
+    engine, made = BulkEngine(session), []
+    for begin in range(0, len(chunks), 3):
+        made.append(engine.take(Block(reads_of(chunks[begin : begin + 3]))))
+    made.append(engine.close())
+    assert _rows(made) == [row for one in outputs(chunks, session) if isinstance(one, Output) for row in one.rows]
 
 
 def test_columns_go_on_when_the_clock_does(monkeypatch: pytest.MonkeyPatch) -> None:
