@@ -65,4 +65,4 @@ def test_a_station_that_one_part_did_not_hear_is_heard():
 
 
 def test_a_table_of_one_frame():
-    assert ring_table.sentences(Ring(first=0, last=1_000_000_000, frames=1))[1].startswith("1 frame in 1.0 s")
+    assert ring_table.sentences(Ring(first=0, last=1_000_000_000, frames=1))[1].startswith("1 frame in 1.00 s")
