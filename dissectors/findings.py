@@ -253,29 +253,38 @@ def with_consequences(findings: Iterable[Finding], rules: Mapping[str, Rule]) ->
     made = list(findings)
     # what is wrong with one station explains more of it than what is wrong with the bus
     order = sorted(range(len(made)), key=lambda at: (-made[at].severity, made[at].about.reaches_all))
+    of_station: dict[int | None, list[int]] = {}
+    for at, finding in enumerate(made):
+        of_station.setdefault(finding.about.station, []).append(at)
     for at in order:
         cause = made[at]
         if cause.cause is not None or cause.severity < Severity.WARNING or cause.code not in rules:
             continue
         codes, there = rules[cause.code].explains, rules[cause.code].explains_there
+        any_of = (*codes, *there)
         for other, finding in enumerate(made):
-            if other == at or finding.cause is not None or _has_nearer(finding, cause, made, rules):
+            if other == at or finding.cause is not None or not finding.code.startswith(any_of):
                 continue
-            is_there = there and finding.count <= cause.count and not set(cause.evidence).isdisjoint(finding.evidence)
-            if (codes and _is_explained(finding, cause, codes)) or (is_there and _is_explained(finding, cause, there)):
+            is_there = finding.count <= cause.count and not set(cause.evidence).isdisjoint(finding.evidence)
+            if not _is_explained(finding, cause, any_of if is_there else codes):
+                continue
+            own = (made[one] for one in of_station[finding.about.station])
+            if not _has_nearer(finding, cause, own, rules):
                 made[other] = as_consequence(finding, cause, rules)
     return from_the_root(_told_once(made, rules), rules)
 
 
-def _has_nearer(finding: Finding, cause: Finding, made: Sequence[Finding], rules: Mapping[str, Rule]) -> bool:
-    """Whether what is found of one station, and may come of what is found of another, may come of its own trouble."""
+def _has_nearer(finding: Finding, cause: Finding, own: Iterable[Finding], rules: Mapping[str, Rule]) -> bool:
+    """Whether what is found of one station, and may come of what is found of another, may come of its own trouble.
+    `own`: all that is found of that station."""
     station = finding.about.station
     if station is None or cause.about.station in (None, station):
         return False
-    own = (one for one in made if one.about.station == station and one.cause is None and one.code in rules)
     return any(
         one.severity >= max(Severity.WARNING, finding.severity)
         and one is not finding
+        and one.cause is None
+        and one.code in rules
         and finding.code.startswith(rules[one.code].explains or ("-",))
         for one in own
     )
