@@ -108,7 +108,8 @@ _ALL = (
         "LN007",
         Severity.NOTE,
         "clock stepped",
-        "The wall clock of the computer was set against its monotonic clock. Intervals are not affected.",
+        "The wall clock of the computer was set against its monotonic clock. Intervals are not affected; in files of "
+        "other programs, whose times run back or ahead there, the one at the step is not known and told as short.",
         "time synchronisation after a start without network; in a log of local time, summer time that begins or ends",
         "nothing; only compare wall times across the step with care",
     ),
