@@ -376,6 +376,8 @@ class LineFindings:
 
     def _parity_setting(self) -> Finding | None:
         """That the port has another parity than the bus, where octets tell it."""
+        if not self._octets:
+            return None
         words = f"{percent(self._marked / self._octets, 0)} of the octets have parity or framing errors"
         if self._senders.are_all_struck() and 10 * self._in_frames >= 8 * self._octets:
             words += f", yet {percent(self._in_frames / self._octets, 0)} are in good frames"

@@ -38,7 +38,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=int,
         choices=written_link_types(),
         help="pcap, pcapng: 252 exported PDU and 165 open in Wireshark as they are, 147 is the bare frame (needs a "
-        "DLT_USER entry), 250 RTAC serial with line errors (needs Decode As), 257 the bare frame of PROFIBUS. "
+        "DLT_USER entry), 250 RTAC serial with line errors (needs Decode As); others are bare frames of one protocol. "
         f"What can hold what, the default first: {held_by_protocols()}",
     )
     parser.add_argument("--microseconds", action="store_true", help=".pcap: times in µs, for programs that know no ns")

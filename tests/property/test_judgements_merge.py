@@ -61,8 +61,8 @@ def judged(session: Session, items: Items) -> Judgement:
 def quiet_places(items: Items) -> list[int]:
     """Where no exchange is under way, behind the first few, and not directly behind what is said to all: that somebody
     answers it is known by what was before. Nor behind a master's answer to a poll: it joins with the token after it.
-    Nor beside an answer that nobody asked for: of the first row its request may be missing, and what another answered
-    in somebody's place is known by the request before."""
+    Nor beside an answer that nobody asked for, or that came late: of the first row its request may be missing, and what
+    another answered in somebody's place is known by the request before; a token may be lost behind it."""
     first: dict[int, int] = {}
     last: dict[int, int] = {}
     to_all: set[int] = set()
@@ -74,7 +74,7 @@ def quiet_places(items: Items) -> list[int]:
             to_all.add(at + 1)
         if any(row.header is not None and row.header.kind == "reply-to-poll-for-master" for row in item.rows):
             to_all.add(at + 1)
-        if any(one.verdict is Verdict.UNSOLICITED for one in item.transactions):
+        if any(one.verdict in (Verdict.UNSOLICITED, Verdict.LATE) for one in item.transactions):
             to_all |= {at, at + 1}
         closed = [number for one in item.transactions for number in (one.id, one.of) if number is not None]
         for number in (*placed, *closed):
