@@ -32,13 +32,14 @@ def overdue(ring: Ring) -> Iterable[Remark]:
     if 2 * then < damaged or not ring.span:
         return
     every = sum(ring.of(RingEventKind.OVERDUE, mac).count for mac in ring.nodes)
-    for mac in ring.nodes:
+    for mac, node in ring.nodes.items():
         struck, late = ring.of(RingEventKind.OVERDUE, mac), ring.of(RingEventKind.LATE_REPLY, mac).count
         waits = ring.of(RingEventKind.NO_REPLY, mac).count + late or struck.count
         share = min(1.0, waits * (T_OVERDUE - T_REPLY_DELAY) / ring.span)
         chance = at_least(struck.count, max(struck.count, damaged), share)
         is_late = late and struck.count >= STRUCK_LEAST and chance < SELDOM
-        is_alone = struck.count >= max(ALONE_LEAST, ALONE_SHARE * every) and chance < ALONE_SELDOM
+        is_there = node.replies > 0 or node.is_master  # who is never heard is most likely off, and speaks into nothing
+        is_alone = is_there and struck.count >= max(ALONE_LEAST, ALONE_SHARE * every) and chance < ALONE_SELDOM
         if not is_late and not is_alone:
             continue
         seen = (

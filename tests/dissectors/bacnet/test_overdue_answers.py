@@ -53,3 +53,12 @@ def test_a_search_that_was_hidden_by_a_late_answer_shuts_nobody_out():
     steps = [*rounds(20, 1, 2, 5), asked(), (270, spoil(token(1, 2), 5)), (0, bytes(range(60, 200)))]
     steps += [(30, token(1, 5)), (2, token(5, 1)), *rounds(60, 1, 5)]
     assert "MS110" not in {code for code, _ in script(steps).graves()}
+
+
+def test_who_is_never_heard_speaks_into_nothing():
+    """2 is damaged after tokens that nobody took: that 60 is asked in vain before them says nothing."""
+    steps = rounds(20, 1, 2, 5)
+    for _ in range(7):
+        steps += [(2, data(1, 60, READ, expects=True)), (270, spoil(token(1, 2), 5)), (30, token(1, 2))]
+        steps += [(2, token(2, 5)), (2, token(5, 1)), *rounds(150, 1, 2, 5, use=9)]
+    assert "MS308" not in {code for code, _ in script(steps).graves()}
