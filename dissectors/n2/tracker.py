@@ -270,7 +270,8 @@ class N2Tracker:
         candidates = [e for e in self._within(frame.start) if e.is_owed and (e.octets != open_.octets or not formless)]
         if self._missed is not None and self._missed not in candidates and self._missed.bad is None:
             candidates.append(self._missed)
-        return best_owed(candidates, frame)
+        same = [exchange for exchange in candidates if exchange.station == open_.station]
+        return best_owed(same, frame) or best_owed(candidates, frame)
 
     def _within(self, now: int) -> list[Exchange]:
         """Commands that had no good answer and may still get one: a station answers in order."""
