@@ -329,7 +329,8 @@ class Keeper:
             pass
         except (OSError, ValueError):
             return None
-        return MOVED if ours.st_nlink else REMOVED
+        # asked anew: it may have been removed since
+        return MOVED if os.fstat(self._part.stream.fileno()).st_nlink else REMOVED
 
     def _finish(self) -> None:
         self._try("check", self._check)
