@@ -38,16 +38,15 @@ def impatience(late: LateSpeakers, heard: Mapping[int, Heard]) -> Impatience | N
     there = {station: one for station, one in heard.items() if one.answers + one.late >= _HEARD}
     are_late = tuple(sorted(station for station, one in there.items() if one.late))
     answers = sum(there[station].late for station in are_late)
-    shown = {station: one.late + hits(window(late, station)) for station, one in there.items()}
+    shown = {station: one.late + _hits(window(late, station)) for station, one in there.items()}
     is_one = 2 * sum(shown.values()) < 3 * max(shown.values(), default=0)  # and hardly anybody else
     if len(are_late) < _STATIONS or answers < _LATE or is_one:
         return None
     waited = [there[station] for station, often in shown.items() if often]
-    damaged = sum(late.damaged.values())
     in_vain = answers + sum(one.missing for one in waited)
-    if 2 * len(waited) < len(there) or 4 * late.overdue < 3 * damaged or damaged > _EACH * in_vain:
+    if 2 * len(waited) < len(there) or 4 * late.overdue < 3 * late.struck or late.struck > _EACH * in_vain:
         return None
-    return Impatience(are_late, answers, in_vain, late.overdue, damaged)
+    return Impatience(are_late, answers, in_vain, late.overdue, late.struck)
 
 
 def window(late: LateSpeakers, station: int) -> Window:
@@ -55,6 +54,6 @@ def window(late: LateSpeakers, station: int) -> Window:
     return late.windows.get(station, _NOTHING)
 
 
-def hits(window: Window) -> int:
+def _hits(due: Window) -> int:
     """How often damage stood directly behind a wait for a station, or showed that it spoke."""
-    return window.behind.count + window.own_behind.count + window.shown.total()
+    return due.behind.count + due.own_behind.count + due.shown.total()

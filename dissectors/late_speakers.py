@@ -173,6 +173,11 @@ class LateSpeakers:
         for other in due:
             self._strike(other, NOBODY, start, rows, is_shown=False)
 
+    @property
+    def struck(self) -> int:
+        """Damaged frames of all senders."""
+        return sum(self.damaged.values())
+
     def is_due_from_another(self, station: int, start: int) -> bool:
         """Whether the late answer of another station is due."""
         return any(other != station for other in self._due(start))

@@ -74,7 +74,7 @@ def under_late_answers(made: Sequence[Finding], seen: BusRecord) -> Iterator[Fin
     main = max(causes.values(), key=lambda one: one.count, default=None)
     missing = sum(one.missing.count for one in late.values())
     every = sum(one.missing.count for one in seen.stations.values() if one.answered)
-    is_all = 4 * seen.late_speakers.overdue >= 3 * _damaged(seen) and 4 * missing >= 3 * every
+    is_all = 4 * seen.late_speakers.overdue >= 3 * seen.late_speakers.struck and 4 * missing >= 3 * every
     in_vain = missing + sum(one.late.count for one in late.values())
     for one in made:
         cause: Finding | None = None
@@ -115,7 +115,3 @@ def _directly_behind(seen: BusRecord, unit: int, station: StationRecord) -> tupl
     if is_behind(both.count, of, silent, station.asked, is_late=True):
         return both, f"{both.count} of {counted(of, 'damaged frame')} of the master and itself"
     return Tally(), ""
-
-
-def _damaged(seen: BusRecord) -> int:
-    return sum(seen.late_speakers.damaged.values())
