@@ -19,7 +19,7 @@ from __future__ import annotations
 import codecs
 import csv
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from heapq import merge
 from itertools import islice, zip_longest
@@ -42,6 +42,7 @@ from sniff.formats.log_plan import LOOKED_AT, LOOKED_AT_CHARACTERS, Plan, plan_o
 from sniff.formats.log_shapes import DECODED, REMARK
 from sniff.formats.octet_table import TableLayout, delimiter_of, heading_of
 from sniff.formats.records import foreign_session
+from sniff.formats.set_back_clock import in_order
 from sniff.formats.timeless import LINE_END, SLOW
 
 if TYPE_CHECKING:
@@ -240,29 +241,28 @@ class ByteLog:
         first = min((chunk.time - len(chunk.octets) * char for chunk in found), default=0)
         if first < 0:  # counted from a trigger: no time is before 1970
             found = [replace(chunk, time=chunk.time - first) for chunk in found]
-        in_order: Iterable[Item] = sorted(
-            found, key=lambda chunk: chunk.time
-        )  # two lines of a bus come one after another
-        if table.exact and table.duration is None:
-            in_order = _one_after_another(found, char)
-        yield from merge(in_order, turns, key=lambda item: item.time)
+
+        def begin(chunk: Chunk) -> int:
+            return chunk.time - len(chunk.octets) * char
+
+        has_begin = table.exact and table.duration is None
+        items = list(in_order(found, char, begin if has_begin else lambda chunk: chunk.time))
+        read = [item for item in items if isinstance(item, Chunk)]  # two lines of a bus, one after another
+        turns += [item for item in items if isinstance(item, LineEvent)]
+        yield from merge(_one_after_another(read, begin) if has_begin else read, turns, key=lambda item: item.time)
 
 
-def _one_after_another(found: list[Chunk], char: int) -> Iterator[Chunk]:
-    """Reads of which the begin is told, in that order; nobody knows how fast the line was: one of several octets ends
+def _one_after_another(read: list[Chunk], begin: Callable[[Chunk], int]) -> Iterator[Chunk]:
+    """Reads in the order of their begin, which is told; nobody knows how fast the line was: one of several octets ends
     before the next begins, and after what began with it."""
-
-    def begin(chunk: Chunk) -> int:
-        return chunk.time - len(chunk.octets) * char
-
     last = 0
-    for chunk, after in zip_longest(sorted(found, key=begin), sorted(map(begin, found))[1:]):
+    for chunk, after in zip_longest(read, map(begin, read[1:])):
         time = chunk.time
         if len(chunk.octets) > 1:
             if after is not None and after > begin(chunk):
                 time = min(time, max(after - LINE_END, (begin(chunk) + after) // 2))
             if begin(chunk) < last:
-                time = last + LINE_END + len(chunk.octets) * char
+                time = last + LINE_END + chunk.time - begin(chunk)
         last = max(last, time)
         yield chunk if last == chunk.time else replace(chunk, time=last)
 

@@ -2,12 +2,15 @@
 
 A computer that finds the right time steps its clock; what it hears goes on. Times that run backwards would put all that
 follows at one moment, with response times of nothing. A single packet that another one overtook changes nothing.
+Rows of a table are sorted, since programs write them by direction, too; where the clock was set back, that would weave
+what came after into what came before.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise, starmap
 from typing import TYPE_CHECKING
 
 from dissectors.frame import Chunk
@@ -20,6 +23,12 @@ if TYPE_CHECKING:
 
 SET_BACK = NS_PER_S
 """ns; by less than that packets come out of order."""
+
+_ROWS_A_STEP = 20
+"""Rows for each time that a table's clock is set back; where times go back more often, rows are in another order."""
+
+_NEAR = 10
+"""Part of a stretch by which another one may begin or end beside it."""
 
 _FAR = 1 << 62
 """ns, the year 2116: what says so lies, and is passed on as it is."""
@@ -47,6 +56,47 @@ def steady_pieces(pieces: Iterable[Item | Reads], char: int) -> Iterator[Item | 
                 yield from clock.tell(chunk)
 
 
+def in_order(rows: Sequence[Chunk], char: int, order: Callable[[Chunk], int]) -> Iterator[Item]:
+    """The rows of a table in `order` of a time, ns, from where its clock was set back on as much later. `char`: ns that
+    a character takes on the line.
+    """
+    begins = _set_back(rows)
+    shift = latest = 0
+    for begin, end in zip((0, *begins), (*begins, len(rows)), strict=True):
+        if begin:
+            follows = latest + len(rows[begin].octets) * char
+            back, shift = latest - rows[begin].time - shift, follows - rows[begin].time
+            yield _step(latest, back)
+        stretch = sorted(rows[begin:end], key=order)
+        latest = max((row.time + shift for row in stretch), default=latest)
+        yield from (replace(row, time=row.time + shift) for row in stretch) if shift else stretch
+
+
+def _set_back(rows: Sequence[Chunk]) -> list[int]:
+    """The rows that are the first by a clock that was set back; none where the order of rows is another one."""
+    found = []
+    for at in range(1, len(rows)):
+        before, time = rows[at - 1].time, rows[at].time
+        is_alone = at + 1 < len(rows) and rows[at + 1].time >= max(before, time + SET_BACK)  # written late
+        if time <= before - SET_BACK and not is_alone:
+            found.append(at)
+    if not found or _ROWS_A_STEP * len(found) > len(rows):
+        return []
+    stretches = [(rows[begin], rows[end - 1]) for begin, end in pairwise((0, *found, len(rows)))]
+    return [] if any(starmap(_are_beside, pairwise(stretches))) else found
+
+
+def _are_beside(one: tuple[Chunk, Chunk], other: tuple[Chunk, Chunk]) -> bool:
+    """Whether two stretches of rows, first and last of each, are of the same time: one list below the other."""
+    (begin, end), (begin_of_other, end_of_other) = one, other
+    near = (end.time - begin.time) // _NEAR
+    return abs(begin_of_other.time - begin.time) <= near or abs(end_of_other.time - end.time) <= near
+
+
+def _step(time: int, back: int) -> LineEvent:
+    return LineEvent(time, LineEventKind.CLOCK, f"the file's clock goes back by {duration(back)}", -back)
+
+
 class _Clock:
     """`_latest`: the latest time told, None before the first; `_shift`: ns to add; `_before`: to what that was before
     the clock was set back last, until a second time shows that it was."""
@@ -70,8 +120,7 @@ class _Clock:
             self._before = None
         elif time <= self._latest - SET_BACK:
             back, follows = self._latest - time, self._latest + len(item.octets) * self._char
-            words = f"the file's clock goes back by {duration(back)}"
-            yield LineEvent(self._latest, LineEventKind.CLOCK, words, -back)
+            yield _step(self._latest, back)
             self._before, self._shift = self._shift, self._shift + follows - time
             time = follows
         if isinstance(item, Chunk) and item.octets:

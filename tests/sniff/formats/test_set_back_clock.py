@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from dissectors.frame import Chunk
 from dissectors.line import NS_PER_S
 from dissectors.modbus.envelope import seal_rtu
 from sniff.engine.blocks import Block, blocks_of
@@ -58,3 +59,33 @@ def test_columns_tell_the_same(seed: int, tmp_path: Path) -> None:
     steps = {dice.randrange(400): dice.choice([-0.5, -1, -3, -3600, 2, 40]) for _ in range(dice.choice([0, 1, 2, 9]))}
     capture = read(as_pcap(tmp_path / "x.pcap", packets(400, steps), 147))
     assert spread(capture.blocks()) == spread(blocks_of(capture.items()))
+
+
+def as_table(path: Path, rows: list[tuple[int, bytes]]) -> list[Chunk | LineEvent]:
+    path.write_text("time,data\n" + "".join(f"{time / NS_PER_S:.3f},{octets.hex(' ')}\n" for time, octets in rows))
+    return list(read(path).items())
+
+
+@pytest.mark.parametrize("back", [3, 5, 12, 3600])
+def test_a_table_goes_on_where_the_clock_was_set_back(back: float, tmp_path: Path) -> None:
+    items = as_table(tmp_path / "x.csv", packets(400, {200: -back}))
+    (event,) = (item for item in items if isinstance(item, LineEvent))
+    assert event.kind is LineEventKind.CLOCK
+    told = [item for item in items if isinstance(item, Chunk)]
+    assert [item.octets for item in told] == [ASKED, ANSWERED] * 200  # none came between two others
+    assert told[-1].time - told[200].time == 199 * 50_000_000
+    assert told[200].time > told[199].time
+
+
+@pytest.mark.parametrize("late", [0, 5])
+def test_lists_of_directions_below_one_another_are_one(late: float, tmp_path: Path) -> None:
+    made = packets(400, {})
+    asked, answered = made[::2], [row for row in made[1::2] if row[0] >= BEGIN + late * NS_PER_S]
+    items = as_table(tmp_path / "x.csv", asked + answered)
+    assert [(item.time, item.octets) for item in items] == [(time, octets) for time, octets in sorted(asked + answered)]
+
+
+def test_rows_in_another_order_are_sorted(tmp_path: Path) -> None:
+    made = packets(400, {})
+    mixed = random.Random(1).sample(made, len(made))
+    assert [item.time for item in as_table(tmp_path / "x.csv", mixed)] == [time for time, _ in made]
