@@ -14,6 +14,7 @@ import numpy as np
 
 from dissectors.modbus.exchange_columns import SAMPLES
 from dissectors.modbus.exchanged import Exchanged
+from dissectors.modbus.heard import Heard
 from dissectors.modbus.learned_timing import READ
 from dissectors.modbus.limits import ILLEGAL, beyond_limits
 from dissectors.modbus.long_silences import SILENCE_LEAST
@@ -280,7 +281,9 @@ class StretchEvidence:
             self._settle(at)
             refused = bool(one.found.refused[at])
             code, answer = (one.octets[one.answer_begin[at] + 2], b"") if refused else (None, one.answer(at))
-            judge.settle_request(judge.station(one.unit[at]), one.transaction(at), one.asked(at), code, answer)
+            asked = one.asked(at)
+            heard = Heard(asked, code, answer)
+            judge.settle_request(judge.station(one.unit[at]), one.transaction(at), asked, heard)
             self._learn_timeout()
 
     def _see_reserved(self, at: int) -> None:
@@ -297,7 +300,7 @@ class StretchEvidence:
         gap = following.frame.start - asked.frame.end
         if gap < SILENCE_LEAST or not judge.silences.note(asked.no, gap):
             judge.waited_in_vain(asked, following)
-        judge.settle_request(judge.station(one.unit[before]), one.transaction(before), asked, None, b"")
+        judge.settle_request(judge.station(one.unit[before]), one.transaction(before), asked, Heard(asked))
         self._learn_timeout()
 
     def _took_long(self, at: int) -> None:
