@@ -3,7 +3,7 @@
 A line is taken apart into a time, a direction and octets, wherever they stand and however they are written
 (`log_clock.py`, `log_spellings.py`, `log_shapes.py` list how; `log_lines.py` does it). What the lines of one log mean,
 of which some repeat others, is told by its first lines together (`log_plan.py`). Tables (CSV) are read by their
-headings (`octet_table.py`).
+headings (`table_heading.py`).
 
 Neither line settings nor protocol are in such a file. Times of logs are those of another program, taken as the end of
 the last octet of a line; `FOREIGN_LATENCY` is assumed, or what the clock of the log leaves open if that is more. Where
@@ -40,9 +40,10 @@ from sniff.formats.log_margin import plain_signs
 from sniff.formats.log_pieces import lines_in, rows_in
 from sniff.formats.log_plan import LOOKED_AT, LOOKED_AT_CHARACTERS, Plan, plan_of
 from sniff.formats.log_shapes import DECODED, REMARK
-from sniff.formats.octet_table import TableLayout, delimiter_of, heading_of
+from sniff.formats.octet_table import TableLayout
 from sniff.formats.records import foreign_session
 from sniff.formats.set_back_clock import in_order
+from sniff.formats.table_heading import delimiter_of, heading_of
 from sniff.formats.timeless import LINE_END, SLOW
 
 if TYPE_CHECKING:

@@ -22,8 +22,8 @@ from dissectors.line import NS_PER_S
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Completeness
 from sniff.formats.files import explain, open_capture
-from sniff.formats.octet_table import heading_of
 from sniff.formats.table_cells import seconds
+from sniff.formats.table_heading import heading_of
 from sniff.formats.waves import MOST_CHANNELS, Edges
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from dissectors.line import NS_PER_S
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Completeness
 from sniff.formats.files import explain, open_capture
-from sniff.formats.octet_table import heading_of
+from sniff.formats.table_heading import heading_of
 from sniff.formats.waves import MOST_CHANNELS, Edges
 
 LONGEST_LINE = 1 << 12
