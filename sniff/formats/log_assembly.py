@@ -14,6 +14,7 @@ from sniff.formats.log_calendar import HOUR, Year, begins_summer, turn
 from sniff.formats.log_clock import DAY, Stamp
 from sniff.formats.log_lines import Kind, Line, head_of
 from sniff.formats.log_packets import carried
+from sniff.formats.log_placing import Placing
 from sniff.formats.log_plan import WINDOW, Plan
 from sniff.formats.log_shapes import Role
 from sniff.formats.table_cells import MOST
@@ -48,7 +49,9 @@ class Assembly:
         self._bit = 1_000_000_000 / line.baud
         self._recent = b""
         self._last = 0
-        self._any = False
+        self._any = self._clocked = False  # whether anything was told, and whether with a time
+        self._told_last: int | None = None
+        self._placing = Placing()
         self._shift = 0
         self._shift_before: int | None = None  # before the clock was set back last
         self._day = 0
@@ -114,6 +117,7 @@ class Assembly:
     def close(self) -> Iterator[Item]:
         """What is held at the end."""
         yield from self._flush()
+        yield from self._placing.close()
 
     # -- lines ---------------------------------------------------------------------------------------------------
 
@@ -271,34 +275,43 @@ class Assembly:
         self._glued = False
         follows = self._last + length + (silence if self._any else 0)
         time = follows
+        is_told = not self._plan.timed
         if self._samples is not None and self._plan.bit_samples:
             ended = (self._samples[1] + self._plan.bit_samples) / self._plan.bit_samples * self._bit
-            time = max(self._last, int(ended)) if ended < MOST else follows
+            time, is_told = max(self._last, length, int(ended)) if ended < MOST else follows, True
         elif self._stamp is not None:
             stamped = self._told(self._stamp)
             told = stamped + self._shift
             told = told if told < MOST else follows  # steps that add up to no time
-            if self._any and self._stamp.local and begins_summer(self._last - self._shift, stamped):
+            if self._clocked and self._stamp.local and begins_summer(self._last - self._shift, stamped):
                 self._shift, told = self._shift - HOUR, told - HOUR
+                yield from self._placing.close()
                 yield turn(self._last, HOUR)
             if self._shift_before is not None and self._last - SET_BACK <= stamped + self._shift_before < told:
                 told, self._shift = stamped + self._shift_before, self._shift_before  # a single line was wrong
                 self._shift_before = None
-            if self._any and told < self._last - SET_BACK:
+            if self._clocked and told < self._last - SET_BACK:
+                yield from self._placing.close()
                 back = turn(self._last, told - self._last)
                 self._shift_before, self._shift = self._shift, self._shift + follows - told
                 told = follows
                 yield back
-            is_coarse = self._stamp.tick >= COARSE or (told == self._last and self._any)
-            time = told
-            if is_coarse and self._any and told > self._last - _BACKWARDS:
-                together = len(octets) == 1 and self._plan.octetwise
-                time = max(told, self._last + length + (0 if together else silence))
-        if not self._any:
-            self._shift = max(0, length - time)  # counted from a trigger, or since the last line: no time before 1970
-            time += self._shift
+            is_told = told != self._told_last
+            silence = 0 if len(octets) == 1 and self._plan.octetwise else silence
+            time, self._told_last = told if is_told else self._last + length + silence, told
+            if self._stamp.tick >= COARSE:
+                is_told = True
+                if self._clocked and told > self._last - _BACKWARDS:
+                    time = max(told, self._last + length + silence)
+            if not self._clocked:
+                lead = self._last + LINE_END if self._any else 0  # of what stands ahead of the first time
+                self._shift = max(0, length + lead - time)  # counted from a trigger, or since the last line
+                time += self._shift  # no time before 1970
+                self._told_last = time
+            self._clocked = True
         self._last, self._any = time, True
-        yield Chunk(time, octets)
+        chunk = Chunk(time, octets)
+        yield from self._placing.told(chunk, self._char) if is_told else self._placing.untold(chunk)
 
     def _told(self, stamp: Stamp) -> int:
         """ns of a stamp; a time of day goes on after midnight."""

@@ -57,10 +57,10 @@ class Plan:
     offsets, whose ends say nothing; None where a line is a frame, or part of one that a tool got at once. `octetwise`:
     an octet a line. `bit_samples`: samples of a bit, of a logic analyser; 0 where there are none.
     `spellings`: how octets are written. `margin`, `times`: what is no part of the lines, how their times are read.
-    `heads`: those above rows that repeat others. `growing`: labels whose lines tell what was heard so far, so that the
-    next has the same with more behind. `labelled`: whether lines with octets have a label; `lower`: whether
-    their digits are small letters; `with_status`: whether what a USB adapter sent begins with its status; `in_codes`:
-    whether digits behind # are decimal.
+    `timed`: whether lines have times. `heads`: those above rows that repeat others. `growing`: labels whose lines tell
+    what was heard so far, so that the next has the same with more behind. `labelled`: whether lines with octets have a
+    label; `lower`: whether their digits are small letters; `with_status`: whether what a USB adapter sent begins with
+    its status; `in_codes`: whether digits behind # are decimal.
     """
 
     kind: str
@@ -74,6 +74,7 @@ class Plan:
     spellings: frozenset[str] = frozenset()
     margin: Margin = NO_MARGIN
     times: Times = AS_WRITTEN
+    timed: bool = False
     labelled: bool = False
     lower: bool = False
     heads: frozenset[str] = frozenset()
@@ -147,7 +148,8 @@ def _plan(texts: Sequence[str]) -> Plan | None:
     if offsets is not None and rows >= others:
         tools = Counter(line.tool for line in lines if line.tool)
         name = f"hexdump ({tools.most_common(1)[0][0]})" if tools else "hexdump"
-        return Plan(name, base, offsets, times=times, heads=heads_of(texts, lines))
+        timed = any(line.stamp is not None for line in lines)
+        return Plan(name, base, offsets, times=times, timed=timed, heads=heads_of(texts, lines))
     lines = [line_of(text, base, False, times) for text in texts]
     ahead = _times_ahead(texts, lines, times)
     if ahead.unit:
@@ -162,7 +164,8 @@ def _plan(texts: Sequence[str]) -> Plan | None:
         )
         plan = replace(plan, outlines=outlines_of(told, base, times))
     with_status = begin_with_status([line.octets for line in lines if _is_of_adapter(line)])
-    return replace(plan, times=times, with_status=with_status) if plan is not None else None
+    timed = any(line.stamp is not None for line in lines)
+    return replace(plan, times=times, timed=timed, with_status=with_status) if plan is not None else None
 
 
 def _is_of_adapter(line: Line) -> bool:
