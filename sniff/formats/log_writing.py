@@ -174,10 +174,13 @@ def _without_index(match: re.Match[str]) -> str:
 
 
 def _is_aligned(match: re.Match[str]) -> bool:
-    """Whether numbers end under one another, and not all have as many digits."""
-    ends = [one.end() for one in re.finditer(r"\d+", match[0])]
-    steps = {later - earlier for earlier, later in pairwise(ends)}
-    return len(steps) == 1 and max(steps) > 2 and "  " in match[0]
+    """Whether numbers end under one another, and not all have as many digits: pairs two spaces apart are read as they
+    stand, and those among them without a letter are part of a longer row."""
+    numbers = list(re.finditer(r"\d+", match[0]))
+    steps = {later.end() - earlier.end() for earlier, later in pairwise(numbers)}
+    if len(steps) != 1 or "  " not in match[0]:
+        return False
+    return len({len(one[0]) for one in numbers}) > 1 or max(steps) > len(numbers[0][0]) + 2
 
 
 def _squeezed(match: re.Match[str]) -> str:
