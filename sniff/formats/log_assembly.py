@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
@@ -31,6 +32,7 @@ SET_BACK = 10 * NS_PER_S
 summer ends; lines of several writers are nearer in order.
 """
 
+_SENT = re.compile(r"\bsent\b", re.IGNORECASE)
 _BACKWARDS = 2_000_000_000
 _MOST_REPEATED = 1 << 16
 _LARGEST = 1 << 32
@@ -74,6 +76,8 @@ class Assembly:
         self._again = ""  # the label of what is held, where it may come again with more behind
         self._is_repeated = False  # whether the rows below tell what others told
         self._whole: Callable[[bytes], bytes] | None = None
+        self._above = ""  # what stands above the rows that are held
+        self._told_last = "", b""  # the same of what was given last, and that
         self.completed = 0
         self.unwrapped = 0
 
@@ -251,6 +255,8 @@ class Assembly:
         if line.kind not in (Kind.REMARK, Kind.EMPTY):
             self._is_repeated = bool(self._plan.heads) and head_of(self._plan.margin.without(text)) in self._plan.heads
             self._whole = line.whole
+        if line.kind is Kind.SHAPE and line.role is Role.HEADING:
+            self._above = head_of(text)
         if line.stamp is not None:
             self._head(line)
 
@@ -269,7 +275,10 @@ class Assembly:
             return
         if self._whole is not None and self._whole(octets) != octets:
             octets = self._whole(octets)
+            if not octets or self._was_told(octets):
+                return
             self.completed += 1
+        self._told_last = self._above, octets
         length = len(octets) * (self._own_char if self._glued else self._char)  # no silence, however fast the line
         silence = 0 if self._glued or self._plan.width is not None else LINE_END
         self._glued = False
@@ -312,6 +321,11 @@ class Assembly:
         self._last, self._any = time, True
         chunk = Chunk(time, octets)
         yield from self._placing.told(chunk, self._char) if is_told else self._placing.untold(chunk)
+
+    def _was_told(self, octets: bytes) -> bool:
+        """Whether a message that was completed is the one before, which the tool heard and now tells otherwise."""
+        above, before = self._told_last
+        return octets == before and above != self._above and not _SENT.search(f"{above} {self._above}")
 
     def _told(self, stamp: Stamp) -> int:
         """ns of a stamp; a time of day goes on after midnight."""

@@ -57,8 +57,20 @@ def _shape(tool: str, pattern: str, role: Role = Role.DATA, whole: Callable[[byt
 
 
 def _with_crc(octets: bytes) -> bytes:
-    """A message with its CRC behind it, unless it has one."""
+    """A message with its CRC behind it, unless it has one; nothing in place of what is none: a number of the tool's."""
+    if len(octets) < 2:
+        return b""
     return octets if not crc16_modbus(octets) else octets + crc16_modbus(octets).to_bytes(2, "little")
+
+
+_OWN_CODES = 0xE0
+"""eModbus: from here on codes of exceptions are its own, of answers that did not come."""
+
+
+def _of_emodbus(octets: bytes) -> bytes:
+    """What eModbus hands on as an answer: nothing where it made it itself."""
+    is_own = len(octets) == 3 and octets[1] & 0x80 and octets[2] >= _OWN_CODES
+    return b"" if is_own else _with_crc(octets)
 
 
 SHAPES: tuple[Shape, ...] = (
@@ -113,9 +125,9 @@ SHAPES: tuple[Shape, ...] = (
     _shape("jpnevulator", rf"^\s*{_S}: \S+$", Role.HEADING),
     _shape("Docklight", r"\[(?P<way>TX|RX|C1|C2)\]"),
     _shape("Docklight", r"^\s*Docklight", Role.NOTHING),
-    _shape("eModbus", r"\b(?P<way>Sent|Received|Request|Response) packet: @[0-9A-Fa-f]{6,16}/\d", Role.HEADING,
-           _with_crc),
-    _shape("eModbus", r"\bData: @[0-9A-Fa-f]{6,16}/\d", Role.HEADING, _with_crc),
+    _shape("eModbus", r"\b(?P<way>Sent|Received|Request) packet: @[0-9A-Fa-f]{6,16}/\d", Role.HEADING, _with_crc),
+    _shape("eModbus", r"\b(?P<way>Response) packet: @[0-9A-Fa-f]{6,16}/\d", Role.HEADING, _of_emodbus),
+    _shape("eModbus", r"\bData: @[0-9A-Fa-f]{6,16}/\d", Role.HEADING, _of_emodbus),
     _shape("eModbus", r"\bRaw buffer (?P<way>received): @[0-9A-Fa-f]{6,16}/\d", Role.HEADING),
     _shape("eModbus", r"\|\s*\w+\.(?:cpp|h)\s*\[.*\]"),
     _shape("Serial Port Monitor", r"(?P<way>Read|Written|Write) data \(COM\d+\)", Role.HEADING),
