@@ -69,9 +69,9 @@ _ALL = (
         "or more, count as good: the rules of the protocol name it. Not where 20 frames or more are good, "
         "with 1 in 10 octets in them: they prove the settings (LN204). Also where none of many different frames has an "
         "octet above 7F, and 1 in 10 is damaged: those are good that never had one. All other rules are left out then: "
-        "they would judge rubbish. What fits is named: another protocol whose checks agree, seven bits read as eight, "
-        "data bits that the port lacks, inverted octets, a bus that is slower (every level lasts a multiple of so many "
-        "bits) or faster (the same few octets again and again, too few for a frame).",
+        "they would judge rubbish. What fits is named: another protocol whose checks agree, frames of a network, "
+        "seven bits read as eight, data bits that the port lacks, inverted octets, a bus that is slower (every level "
+        "lasts a multiple of so many bits) or faster (the same few octets again and again, too few for a frame).",
         "wrong baud rate, wrong parity, wrong protocol, or A and B swapped",
         "the settings of the line (-s) and the protocol (-p); then A and B",
     ),
@@ -200,8 +200,9 @@ _ALL = (
         "octets that are no frame",
         "Stretches of four octets or more that are no frame, and what follows a damaged frame: 1 in 50 octets or more "
         "of all. A smaller share is only noted. Said is where they are another protocol's frames with good checks, "
-        "where they are always the same, and where they were sent with a slower baud rate. Where nearly all come in "
-        "place of the answers of one station that is not heard otherwise, it is told of that station.",
+        "or a network's, where they are always the same, and where they were sent with a slower baud rate. Where "
+        "nearly all come in place of the answers of one station that is not heard otherwise, it is told of that "
+        "station.",
         "damaged frames beyond recognition, another protocol on the same line, or a device with another baud rate",
         "what the stretches have in common: their place, time and first octets",
         told_by=_DAMAGED,

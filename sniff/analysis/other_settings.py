@@ -1,8 +1,8 @@
 """Other settings that fit octets which make no frames with those of the capture. Pure, bounded.
 
 Asked is, of a sample: another parity; another protocol (every one that the registry knows); seven bits read as eight;
-fewer data bits than the bus has; line ends that a terminal changed; every bit inverted; a bus that is slower or faster.
-What fits is named with its evidence; where nothing does, nothing is named.
+frames of a network; fewer data bits than the bus has; line ends that a terminal changed; every bit inverted; a bus that
+is slower or faster. What fits is named with its evidence; where nothing does, nothing is named.
 """
 
 from __future__ import annotations
@@ -35,19 +35,24 @@ DAMAGED_LEAST, DAMAGED_OFTEN = 3, 10
 DIFFERENT_LEAST = 10
 """So many different frames, each with two octets of check: chance leaves bit 7 out of all once in a million."""
 
+TOP_SET = 5
+"""Of so many octets of checks one at least has the highest bit that is left; half of them should."""
+
 _TEXT = frozenset(b"\r\n\t") | frozenset(range(0x20, 0x7F))
 
 
 @dataclass(frozen=True, slots=True)
 class Fit:
     """Settings that fit: what was seen, what it is consistent with, what to do. `lacks_bits`: octets had more bits;
-    `is_parity`: they are as they should be, but for line errors that another parity of the port would not make."""
+    `is_parity`: they are as they should be, but for line errors that another parity of the port would not make;
+    `of_network`: frames that belong on no line."""
 
     seen: str
     means: str
     next: str
     lacks_bits: bool = False
     is_parity: bool = False
+    of_network: bool = False
 
 
 def what_fits(
@@ -66,7 +71,7 @@ def other_protocol(sample: Sequence[Chunk], line: LineSettings, latency: int, pr
         return None
     found = _convincing(_evidence(sample, line, latency))
     if found is None or found.protocol == protocol:
-        return None
+        return _of_network(sample, line, latency) if found is None else None
     return _as_protocol(found, "these octets read", f"somebody speaks {found.protocol}", f"-p {found.protocol}")
 
 
@@ -85,6 +90,8 @@ def _fits(sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: s
         yield _as_protocol(
             found, "these octets read", f"the bus runs {found.protocol}", f"read it with -p {found.protocol}"
         )
+    if (of_network := _of_network(sample, line, latency)) is not None:
+        yield of_network
     yield from _by_line_ends(sample, line, latency)
     inverted = _changed(sample, 0xFF, 0xFF)
     if (found := _convincing(_evidence(inverted, line, latency))) is not None:
@@ -124,13 +131,33 @@ def _by_line_ends(sample: Sequence[Chunk], line: LineSettings, latency: int) -> 
 
 
 def _as_protocol(found: Candidature, how: str, means: str, settle: str) -> Fit:
-    checks = f"{found.frames} frames hold {percent(found.covered, 0)} of {found.octets} octets"
-    return Fit(f"{how} as {found.protocol} with good checks ({checks})", means, settle)
+    return Fit(f"{how} as {found.protocol} with good checks ({_held(found)})", means, settle)
 
 
-def _evidence(sample: Sequence[Chunk], line: LineSettings, latency: int) -> CandidateEvidence:
-    """All protocols over the sample."""
-    evidence = CandidateEvidence(line, registry.names(), latency)
+def _held(found: Candidature) -> str:
+    return f"{found.frames} frames hold {percent(found.covered, 0)} of {found.octets} octets"
+
+
+def _of_network(sample: Sequence[Chunk], line: LineSettings, latency: int) -> Fit | None:
+    """Frames as networks carry them, which came onto the line as they are."""
+    found = _convincing(_evidence(sample, line, latency, tuple(registry.RELATIVES)))
+    if found is None:
+        return None
+    title = registry.get(found.protocol).title
+    return Fit(
+        f"these octets are frames of {title}, header and all ({_held(found)})",
+        "frames of a network on a serial line: a converter hands them on as they are, and whoever expects those of "
+        "this line passes them by",
+        "the converter: as a gateway it translates them; or whoever sends through it: the frames of this line",
+        of_network=True,
+    )
+
+
+def _evidence(
+    sample: Sequence[Chunk], line: LineSettings, latency: int, protocols: Sequence[str] | None = None
+) -> CandidateEvidence:
+    """All protocols over the sample, or those named."""
+    evidence = CandidateEvidence(line, registry.names() if protocols is None else protocols, latency)
     for chunk in sample:
         evidence.feed(chunk)
     if sample:
@@ -171,6 +198,9 @@ def _by_values(sample: Sequence[Chunk], line: LineSettings) -> Iterator[Fit]:
     if total < 2 * LEAST_OCTETS or len(values) < 8 or top > 0x7F:
         return
     bits = 5 if top <= 0x1F else 6 if top <= 0x3F else 7
+    ends = b"".join(octets[-2:] for octets in {chunk.octets for chunk in sample if len(chunk.octets) > 3})
+    if TOP_SET * sum(octet >> (bits - 1) for octet in ends) < len(ends):
+        return  # there stands no check, and small numbers are all there is
     text = sum(count for value, count in values.items() if value in _TEXT)
     if text >= 0.95 * total:
         return  # a protocol of text that nobody here knows

@@ -94,9 +94,9 @@ class Remains:
             finding = replace(finding, seen=words + (" …)" if len(same) > 8 else ")"))
         fit = self._other_protocol()
         if fit is not None:
-            means = f"another protocol on the same line: {fit.means}"
-            seen = f"{finding.seen}; {fit.seen}"
-            return replace(finding, seen=seen, means=means, next=_WHO_SPEAKS_IT, is_told_apart=True)
+            means = fit.means if fit.of_network else f"another protocol on the same line: {fit.means}"
+            settle = fit.next if fit.of_network else _WHO_SPEAKS_IT
+            return replace(finding, seen=f"{finding.seen}; {fit.seen}", means=means, next=settle, is_told_apart=True)
         factor = slower_by(rests, line)
         if not factor:
             return finding

@@ -12,7 +12,7 @@ from dissectors.line import LineSettings
 from dissectors.modbus.envelope import seal_ascii, seal_rtu
 from dissectors.n2.envelope import make_command
 from dissectors.profibus.telegram import telegram
-from sniff.analysis.other_settings import Fit, lacking_bits, what_fits
+from sniff.analysis.other_settings import Fit, lacking_bits, other_protocol, what_fits
 from sniff.analysis.slower_bus import slower_by
 from sniff.simulation.collision import low_times, receive
 
@@ -199,3 +199,28 @@ def test_a_protocol_that_ends_with_cr_alone() -> None:
 def test_lines_of_text_are_no_protocol_whatever_ends_them() -> None:
     lines = [f"temperature {at * 7 % 50} C, all is well\n".encode() for at in range(40)]
     assert fit(lines) is None
+
+
+def of_tcp(number: int, unit: int, pdu: str) -> bytes:
+    body = bytes.fromhex(pdu)
+    return number.to_bytes(2, "big") + bytes((0, 0, 0, 1 + len(body), unit)) + body
+
+
+def test_frames_of_a_network_on_a_line_are_told_as_such() -> None:
+    asked = [of_tcp(number, 1 + number % 2, "03 00 10 00 04") for number in range(8)]
+    told = fit(asked, "modbus-rtu")
+    assert told is not None
+    assert told.of_network
+    assert "frames of Modbus TCP, header and all (8 frames hold 100%" in told.seen
+    found = other_protocol(chunks(asked), LINE, 0, "modbus-rtu")
+    assert found is not None
+    assert found.of_network
+
+
+def test_small_numbers_without_a_check_lack_no_bits() -> None:
+    asked = [bytes((1 + number % 9, 3 + number % 2, 0, 5 + number, 0, 1 + number % 4)) for number in range(16)]
+    assert fit(asked, "modbus-rtu") is None
+    masked = [bytes(octet & 0x1F for octet in frame) for frame in polls()]
+    lacking = fit(masked, "modbus-rtu")
+    assert lacking is not None
+    assert lacking.lacks_bits
