@@ -56,6 +56,7 @@ class Exchange:
     segmented: bool = False  # request or answer came in segments
     more_follows: bool = False  # of a request: its newest segment is not the last
     ends_with: int | None = None  # sequence number of the answer's last segment, once that was seen
+    usurped: bool = False  # another station answered in its place: whether the one that was asked did, nobody knows
     becomes: Verdict | None = None  # of segments that answer what is closed, or nothing: the verdict at their end
 
     @property
@@ -102,6 +103,8 @@ class Exchange:
         """
         if self.becomes is not None:
             return self.close(self.becomes)
+        if self.usurped:
+            return self.close(Verdict.OPEN, error="another station answered")
         if self.response is None:
             return self.close(Verdict.NO_RESPONSE)
         return self.close(Verdict.OPEN, error="its segments stopped before the last one")

@@ -239,6 +239,8 @@ class MstpRingObserver(TokenWatch):
         other = answered_for(frame, self._before, None if asked is None else asked.frame)
         if other is None:
             return False
+        if asked is not None:
+            asked.usurped = True
         self._tally.note(RingEventKind.FOR_ANOTHER, frame.start, no, source, other)
         return True
 

@@ -42,6 +42,7 @@ class AskedInRing:
     `missed`: it was counted as one that nobody answered. `overtaken`: ns after which who asked went on, so soon that it
     must have had the answer, though that was not heard; None elsewhere.
     `free`: it asks by its frame type alone, as segments of an answer do; who is asked may answer now, later or not.
+    `usurped`: another station has answered in place of the one that was asked, so that who asked may go on with that.
     """
 
     frame_type: int
@@ -52,6 +53,7 @@ class AskedInRing:
     missed: bool = False
     overtaken: int | None = None
     free: bool = False
+    usurped: bool = False
 
 
 class RingQuestions:
@@ -213,6 +215,8 @@ class RingQuestions:
             self._unanswered.popitem(last=False)
         if self.doubt or more_follows(asked.frame) or self._is_owed(frame):
             return
+        if asked.usurped and not surely_over(frame, asked.frame, T_REPLY_DELAY):
+            return  # who asked went on with the other one's answer
         if self._unheard.answered(asked.no, asked.frame, frame):
             asked.overtaken = frame.start - asked.frame.end if frame.octets[4] == asked.source else None
         else:

@@ -27,9 +27,10 @@ from dataclasses import dataclass, replace
 from dissectors.bacnet.apdu import NEGATIVE_ACK, Apdu, PduType
 from dissectors.bacnet.data_exchanges import DataExchanges
 from dissectors.bacnet.exchange import Exchange, Key, mirrored, read
+from dissectors.bacnet.foreign_answers import answered_for
 from dissectors.bacnet.frame_types import EXPECTING, FrameType, total
 from dissectors.bacnet.header import is_whole_header
-from dissectors.bacnet.limits import MAX_ENCODED, T_USAGE_DELAY, TURNAROUND_BITS
+from dissectors.bacnet.limits import MAX_ENCODED, T_REPLY_DELAY, T_USAGE_DELAY, TURNAROUND_BITS
 from dissectors.bacnet.reassembly import Reassembler
 from dissectors.bacnet.turn import Turn
 from dissectors.frame import Event, Frame, Header, Noise, Role
@@ -74,6 +75,7 @@ class MstpTracker(DataExchanges):
         self._turn = Turn(timing)
         self._clock: int | None = None
         self._reassembler = Reassembler()
+        self._usurped: Exchange | None = None  # another station has just answered in place of the one that was asked
 
     def track(self, no: int, event: Event, header: Header | None) -> Tracked:
         """Take the next event."""
@@ -101,6 +103,8 @@ class MstpTracker(DataExchanges):
             return self._damaged(no, frame, header, closed)
         frame_type = frame.octets[2]
         self._turn.see(frame, frame_type, frame.octets[4], frame.octets[3])
+        if self._usurped is not None:
+            self._see_wait(self._usurped, frame, closed)
         waiting = self._waiting
         if waiting is not None:
             answered = self._answer_now(waiting, no, frame, header, closed)
@@ -176,8 +180,27 @@ class MstpTracker(DataExchanges):
                 self._waiting = None  # the same segment again
                 self._keep(waiting, closed)
                 return None
+        if self._is_usurped(waiting, frame):
+            waiting.usurped, self._waiting, self._usurped = True, None, waiting
+            self._keep(waiting, closed)
+            return None
         self._let_go(waiting, closed)
         return None
+
+    def _is_usurped(self, waiting: Exchange, frame: Frame) -> bool:
+        """Whether another station answers in place of the one that was asked: who asked takes it and goes on."""
+        if waiting.key is None or self._previous is None or self._previous[1] != waiting.id:
+            return False
+        asked = self._previous[0]
+        return frame.octets[4] != waiting.destination and answered_for(frame, asked, asked) == waiting.destination
+
+    def _see_wait(self, usurped: Exchange, frame: Frame, closed: list[Transaction]) -> None:
+        """Who asked did not take the answer of another station where it waits until it may give up."""
+        self._usurped = None
+        if frame.octets[4] == usurped.source and usurped.interval(frame).low >= T_REPLY_DELAY:
+            assert usurped.key is not None
+            self._postponed.pop(usurped.key, None)
+            closed.append(self._end(usurped, Verdict.NO_RESPONSE))
 
     def _is_of_open(self, damaged: Exchange, key: Key, apdu: Apdu, closed: list[Transaction]) -> bool:
         """Whether what follows a damaged request belongs to an exchange that was open before; the request is over then.

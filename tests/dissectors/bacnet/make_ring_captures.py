@@ -251,6 +251,17 @@ def answers_for_others() -> list[Step]:
     return steps + rounds(4, 3, 12, 19)
 
 
+def taken_for_anothers() -> list[Step]:
+    """19 answers what 12 is asked, and 3 takes that and goes on: 12 had no time, and is innocent."""
+    steps: list[Step] = []
+    for at in range(5):
+        ask, value = (f"{octets[:at_id]}{at + 1:02x}{octets[at_id + 2 :]}" for octets, at_id in ((READ, 8), (VALUE, 6)))
+        steps += [*rounds(3, 3, 12, 19), (2, data(3, 12, ask, expects=True)), (4, data(19, 3, value))]
+        steps += [(2, token(3, 12)), *([(3.0, data(12, 3, value))] if at == 4 else [])]
+        steps += [(2, token(12, 19)), (2, token(19, 3))]
+    return steps + rounds(3, 3, 12, 19)
+
+
 def token_to_itself() -> list[Step]:
     """3 believes to be alone, and passes the token to itself; the adapter hides how soon."""
     return [(4 + at % 3 * 9, token(3, 3)) for at in range(60)]
@@ -282,6 +293,7 @@ MADE = {
     "ms-tp-questions-not-understood-here": questions_not_understood,
     "ms-tp-last-two-octets-missing": last_two_octets_missing,
     "ms-tp-answers-what-others-are-asked": answers_for_others,
+    "ms-tp-answers-in-place-of-another": taken_for_anothers,
     "ms-tp-token-to-itself-behind-an-adapter": token_to_itself,
 }
 
