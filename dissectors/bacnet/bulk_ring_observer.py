@@ -112,6 +112,10 @@ class BulkRingObserver(MstpRingObserver):
         if columns.asks[last]:
             kind = int(columns.kind[last])
             self._questions.asked = AskedInRing(kind, source, destination, frame, told.first + last)
+        if not columns.poll[last]:
+            self._series.forget()
+        elif (began := int(columns.series[last])) >= begin:
+            self._series.goes_on(source, int(columns.start[began]))
         self._questions.alone_since = columns.alone_since(last)
         self._storms.see_many(columns.end[rows][columns.to_all[rows]].tolist())
         self._reads.pass_by(frame)

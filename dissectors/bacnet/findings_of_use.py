@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from dissectors.bacnet.limits import N_POLL, T_USAGE_DELAY
+from dissectors.bacnet.limits import N_POLL, T_NO_TOKEN, T_REPLY_DELAY, T_REPLY_TIMEOUT, T_USAGE_DELAY
 from dissectors.bacnet.ring import Ring, RingNode
 from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.bacnet.ring_questions import T_GO_ON
@@ -29,6 +29,7 @@ STORM_LEAST = 10 * NS_PER_S
 
 STORM_OF_ONE = 0.8
 NEAR_LIMIT = 0.9
+WAITS_SHARE = 0.5
 STRETCHED = 5
 """So many times longer than an idle one is a round where data take nearly all of the time."""
 
@@ -55,10 +56,16 @@ def polls(ring: Ring) -> Iterable[Remark]:
                 "the bus "
                 f"stood still for up to {measured(stopped.most)}"
             )
+        on = ring.of(RingEventKind.POLLED_ON, mac)
+        if on.count > 1:
+            seen.append(
+                f"{times(on.count)} it polled one address after another with one token though it had lost nobody, up "
+                f"to {node.highest_polled}, and the bus stood still for up to {measured(on.most)}; one poll is usual"
+            )
         if seen:
             words = "; ".join(seen)
             remark = plain("MS201", ring, mac, f"{words}; {advice[mac]}" if mac in advice else words, made)
-            if whole is not None and mac in together and stopped.count <= 1:
+            if whole is not None and mac in together and stopped.count <= 1 and on.count <= 1:
                 remark = Remark(mac, as_consequence(remark.finding, whole.finding, RULES))
             yield remark
     yield from _waits(ring)
@@ -203,10 +210,31 @@ def _near_limit(ring: Ring) -> Iterable[Remark]:
         return
     loop = sorted(known)[len(known) // 2]
     rounds = max((ring.nodes[mac].loop.count for mac in ring.order if mac in ring.nodes), default=0)
-    for_data = 1 - rounds * idle / ring.span - ring.poll_waste_share
+    for_data = 1 - rounds * idle / ring.span - ring.poll_waste_share - _in_vain(ring) / ring.span
     if for_data >= NEAR_LIMIT and loop >= STRETCHED * idle:
         seen = (
-            f"data take {percent(for_data, 0)} of the time; a round takes {measured(loop)} where an idle one would "
-            f"take {at_most}{measured(idle)}"
+            f"data take {percent(for_data, 0)} of the time{_of_them_waits(ring)}; a round takes {measured(loop)} where "
+            f"an idle one would take {at_most}{measured(idle)}"
         )
         yield plain("MS603", ring, None, seen, severity=Severity.NOTE)
+
+
+def _in_vain(ring: Ring) -> int:
+    """How long the bus waited at least for answers that did not come, and for a token that was lost, ns."""
+    waits = {
+        RingEventKind.NO_REPLY: T_REPLY_TIMEOUT,
+        RingEventKind.LOST_TOKEN: T_NO_TOKEN,
+        RingEventKind.ALL_SILENT: T_NO_TOKEN,
+    }
+    return sum(happened.count * waits.get(what, 0) for (what, _), happened in ring.happened.items())
+
+
+def _of_them_waits(ring: Ring) -> str:
+    """How much of the time goes into waiting for answers, and for whose, where that is half of it and more."""
+    waits = {mac: node.reply.total for mac, node in ring.nodes.items()}
+    share = sum(waits.values()) / ring.span
+    if share < WAITS_SHARE or not ring.measurable(T_REPLY_DELAY):
+        return ""
+    slowest = max(waits, key=lambda mac: waits[mac])
+    median = ring.nodes[slowest].reply.quantile(0.5)
+    return f", {percent(share, 0)} the wait for answers (longest for MAC {slowest}, median {measured(median or 0)})"

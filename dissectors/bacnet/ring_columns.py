@@ -17,6 +17,7 @@ import numpy as np
 from dissectors.bacnet.frame_types import HEADER, PROPRIETARY, FrameType
 from dissectors.bacnet.limits import BROADCAST, MAX_DATA, MAX_MASTER, T_NO_TOKEN, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.ring_questions import T_GO_ON
+from dissectors.bacnet.searches import T_STOPPED
 from dissectors.bacnet.storms import STORM_BROADCASTS, STORM_WITHIN
 from dissectors.bacnet.turn_columns import TaughtTurns
 from dissectors.columns import ROLES
@@ -25,7 +26,7 @@ from dissectors.frame import Role
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from dissectors.columns import Masks
+    from dissectors.columns import Masks, Times
     from dissectors.line import Timing
     from dissectors.row_columns import RowColumns
 
@@ -41,6 +42,7 @@ class RingColumns:
 
     `start`, `end`, `slack`, `length`, `kind` (frame type), `source`, `destination`: as in the rows. `token`, `poll`,
     `poll_reply`, `data`: what it is. `asks`: the next frame answers it. `answers`: it answers the frame before.
+    `series`: of a poll, the row where polls of its sender began to follow one another; of another row, itself.
     `after`: who has the token behind it, or was sent it. `gap`: ns since the row before. `clean`: see above; the first
     two never are. `turns`: what they teach of who speaks to whom.
     """
@@ -69,6 +71,7 @@ class RingColumns:
         self._back = back
         self.answers = back & (_before(self.poll) & self.poll_reply | _before(self.asked) & self.data)
         self.after = np.where(self.token | self.answers, self.destination, self.source)
+        self.series = _series(self.poll, self.source)
         self.gap = np.zeros(len(rows), np.int64)
         self.gap[1:] = self.start[1:] - self.end[:-1]
         self._least_gap = least_gap
@@ -133,6 +136,10 @@ class RingColumns:
         soonest = np.zeros(len(self), np.int64)  # since a poll came alone, as `Questions` reckons
         soonest[2:] = self.start[2:] - self.end[:-2] + self.slack[:-2] - (self.end[1:-1] - self.start[1:-1])
         in_time &= ~(gone_on & ((surely > T_GO_ON) | (soonest < T_USAGE_DELAY // 2)))
+        began = self.series[:-1]  # before a table, or so long ago that it may say something
+        in_time[1:] &= (
+            ~_before(self.poll)[1:] | self.poll[1:] | ((began > 0) & (self.start[1:] - self.start[began] < T_STOPPED))
+        )
         return in_time
 
     def _are_dense(self, broadcasts: Iterable[int]) -> Masks:
@@ -146,6 +153,13 @@ class RingColumns:
             within[many:] = times[many:] - times[:-many] <= STORM_WITHIN
             dense[places[within[len(times) - len(places) :]]] = True
         return dense
+
+
+def _series(poll: Masks, source: Times) -> Times:
+    first = np.ones(len(poll), bool)
+    first[1:] = ~(poll[1:] & poll[:-1] & (source[1:] == source[:-1]))
+    begun: Times = np.maximum.accumulate(np.where(first, np.arange(len(poll)), 0))
+    return begun
 
 
 def _before(mask: Masks) -> Masks:

@@ -34,6 +34,7 @@ class RingEventKind(Enum):
     USED_BOTH = "used the token and its repeat"
     SLOW_SEARCH = "late to go on after a poll that nobody answered"
     STOPPED = "searched for a successor for over a second"
+    POLLED_ON = "polled one address after another for over a second, though it had lost nobody"
     STORM = "one of many broadcasts in a short time"
     LATE_REPLY = "late to answer"
     NO_REPLY = "no answer"

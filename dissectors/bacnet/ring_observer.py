@@ -21,6 +21,7 @@ from dissectors.bacnet.ring_events import RingEventKind
 from dissectors.bacnet.ring_questions import AskedInRing
 from dissectors.bacnet.ring_tally import NodeTally
 from dissectors.bacnet.ring_window import Happening, MstpRingWindow, RingJournal
+from dissectors.bacnet.searches import PollSeries
 from dissectors.bacnet.storms import Storms
 from dissectors.bacnet.token_watch import AT_ONCE, TokenWatch
 from dissectors.bacnet.turn import Turn
@@ -52,6 +53,7 @@ class MstpRingObserver(TokenWatch):
         self._missed: int | None = None  # where octets may be lost, until an event comes after it
         self._turn = Turn(timing)
         self._storms = Storms()
+        self._series = PollSeries()
 
     def see(self, no: int, event: Event, header: Header | None) -> None:
         """Take the next event; `header` is None for noise.
@@ -131,6 +133,7 @@ class MstpRingObserver(TokenWatch):
         self._repeated.forget()
         self._questions.forget()
         self._reads.forget()
+        self._series.forget()
         self._doubt, self._broke_off = True, False
         self._tally.hole = max(self._tally.hole, end)
         for node in self._tally.nodes.values():
@@ -187,6 +190,7 @@ class MstpRingObserver(TokenWatch):
             took = self._repeated.see(frame, frame_type, source, destination)
             if took is not None:
                 tally.note(RingEventKind.USED_BOTH, frame.start, no, slow, None, took)
+        self._series.see(tally, no, frame, frame_type, source)
         self._questions.holder, asked = self._holder, self._questions.asked
         if self._answers_for_another(no, frame, frame_type, source, destination):
             node.data_sent += 1

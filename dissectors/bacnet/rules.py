@@ -143,7 +143,7 @@ _ALL = (
         "with the share of time that unanswered polls take. Polls of a search for a successor, the first one or a lost "
         "one, do not count. Where half of all masters do so, and two at least, it is one finding about the bus, and "
         "theirs are noted under it. But searches after a loss that stopped the bus for over a second are said, with "
-        "their cost.",
+        "their cost, and so are polls of many addresses with one token where nobody was lost.",
         "a station that does not count to Npoll, or polls far beyond the last address",
         "Max_Master and firmware of the stations named; gaps in the addresses",
     ),
@@ -371,9 +371,11 @@ _ALL = (
         "MS603",
         Severity.NOTE,
         "bus near its limit",
-        "Data take nine tenths of the time, and a round takes five times as long as an idle one.",
-        "as much is asked as the line can carry: whatever is added makes all slower",
-        "what is asked how often; the baud rate; a second segment",
+        "Data take nine tenths of the time, and a round takes five times as long as an idle one. Waits for answers are "
+        "part of that; those for answers that never come, and for lost tokens, are not.",
+        "as much is asked as the line can carry, or as those who answer slowly allow: whatever is added makes all "
+        "slower",
+        "what is asked how often, and who answers slowly; the baud rate; a second segment",
         told_by=("LN401",),
     ),
 )

@@ -142,6 +142,19 @@ def impatient() -> list[Step]:
     return steps
 
 
+def polls_on() -> list[Step]:
+    """8 polls one address after another with one token, though 25 has its token each time."""
+    steps: list[Step] = []
+    for _ in range(2):
+        steps += [
+            *rounds(8, 8, 25),
+            *[(2.0 if no == 26 else 24.0, poll(8, no)) for no in range(26, 70)],
+            (24, token(8, 25)),
+        ]
+        steps += [(2, token(25, 8))]
+    return steps + rounds(8, 8, 25)
+
+
 def storm() -> list[Step]:
     """5 sends Who-Is without pause."""
     steps: list[Step] = []
@@ -282,6 +295,7 @@ MADE = {
     "ms-tp-number-is-taken": number_is_taken,
     "ms-tp-slow-between-polls": slow_polls,
     "ms-tp-does-not-wait-for-answers-to-polls": impatient,
+    "ms-tp-polls-on-with-one-token": polls_on,
     "ms-tp-broadcast-storm": storm,
     "ms-tp-one-uses-most-of-the-line": one_hog,
     "ms-tp-reads-held-back": held_read,
