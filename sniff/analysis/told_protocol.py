@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from dissectors import registry
+from dissectors.findings import counted
 from dissectors.frame import Chunk, Frame
 from dissectors.line import NS_PER_S, LineSettings, Timing
 from dissectors.manifest import Dissector
@@ -65,9 +66,12 @@ class Told:
     def words(self) -> str:
         """For people: the protocol, how sure, and why."""
         reading = self.reading
-        if reading is None or self.sureness is Sureness.NO:
+        if reading is None:
             return "no protocol makes good frames of its octets"
         frames = "1 good frame holds" if reading.frames == 1 else f"{reading.frames} good frames hold"
+        if self.sureness is Sureness.NO:
+            frames = f"{counted(reading.frames, 'good frame')} of {registry.get(reading.protocol).title}"
+            return f"{frames} in {reading.octets} octets, too few to tell"
         said = f"{self.sureness.value}: {frames} {percent(reading.covered, 0)} of {reading.octets} octets"
         if self.sureness is Sureness.SURE:
             said += f", {sureness(reading)}"

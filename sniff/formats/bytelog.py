@@ -90,9 +90,9 @@ class ByteLog:
         self._counts = _Counts()
         lines = list(_first(self._lines()))
         start = "\n".join(lines[:_SAYS])
-        for written, what in DECODED:
+        for written, what, instead in DECODED:
             if written.search(start) is not None:
-                raise CaptureError(f"{path}: {what}; give this program the capture itself, or `tshark -x` of it")
+                raise CaptureError(f"{path}: {what}; give this program {instead}")
         self._heading = _heading(lines)
         self._plan: Plan | None = None
         if self._heading is None:

@@ -77,7 +77,7 @@ class Assembly:
         self._is_repeated = False  # whether the rows below tell what others told
         self._whole: Callable[[bytes], bytes] | None = None
         self._above = ""  # what stands above the rows that are held
-        self._told_last = "", b""  # the same of what was given last, and that
+        self._message_last = "", b""  # the same of what was given last, and that
         self.completed = 0
         self.unwrapped = 0
 
@@ -278,7 +278,7 @@ class Assembly:
             if not octets or self._was_told(octets):
                 return
             self.completed += 1
-        self._told_last = self._above, octets
+        self._message_last = self._above, octets
         length = len(octets) * (self._own_char if self._glued else self._char)  # no silence, however fast the line
         silence = 0 if self._glued or self._plan.width is not None else LINE_END
         self._glued = False
@@ -324,7 +324,7 @@ class Assembly:
 
     def _was_told(self, octets: bytes) -> bool:
         """Whether a message that was completed is the one before, which the tool heard and now tells otherwise."""
-        above, before = self._told_last
+        above, before = self._message_last
         return octets == before and above != self._above and not _SENT.search(f"{above} {self._above}")
 
     def _told(self, stamp: Stamp) -> int:

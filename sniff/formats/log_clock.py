@@ -165,8 +165,9 @@ def _clock(pattern: str) -> re.Pattern[str]:
 
 
 CLOCKS: tuple[Clock, ...] = (
-    Clock("date and time", _clock(rf"(?P<date>\d{{1,4}}[-./]\d{{1,2}}[-./]\d{{1,4}})(?:[ Tt_:-]|, ?| +){_TIME}"
-                                  r"(?P<zone>[Zz]| ?[+-]\d\d:?\d\d(?![\d.]))?"), _dated, dated=True),
+    Clock("date and time", _clock(rf"(?P<date>\d{{1,4}}[-./]\d{{1,2}}[-./]\d{{1,4}})(?:[ Tt_:@-]|, ?| +){_TIME}"
+                                  r"(?P<zone>[Zz]| ?[+-]\d\d:?\d\d(?![\d.])|  [+-]\d\d:\d\d(?![\d.:]))?"), _dated,
+          dated=True),
     Clock("day, month by name, year and time", _clock(rf"(?P<day>\d{{1,2}})[-/ ]{_MONTH}[-/ ]"
                                                                rf"(?P<year>\d{{4}})[ ,T:]+{_TIME}"
                                                                r"(?P<zone>Z| ?[+-]\d\d:?\d\d(?![\d.]))?"),
@@ -217,7 +218,9 @@ CLOCKS: tuple[Clock, ...] = (
 _HEAD = 160
 """Characters at the begin of a line in which a time is looked for."""
 _TAIL = 80
-_ONLY_BRACKETS = re.compile(r"(?:\s*\d{1,7}\s+|[A-Z][a-z]{2}\(\d+\):)?[\s\[({<#*|+]*(?:\[?[A-Z]\]?[ ]?)?")
+_ONLY_BRACKETS = re.compile(
+    r"(?:\s*\d{1,7}\s+|[A-Z][a-z]{2}\(\d+\):|[a-z]\w*-\d{1,3}:)?[\s\[({<#*|+]*(?:\[?[A-Z]\]?[ ]?)?"
+)
 
 
 def stamp_of(line: str, times: Times = AS_WRITTEN) -> Stamp | None:

@@ -223,9 +223,17 @@ _COLUMN_BESIDE = re.compile(r"[ \t]*[|;]?[ \t]+(?=[0-9A-Fa-f(\[<{])")
 
 
 def label_of(lead: str) -> str:
-    """What stands before octets, without times; the same for all lines of one sort."""
-    return " ".join(_DIGITS.sub("#", WAYS.sub("~", _WEEKDAY.sub("", lead))).replace(STAMP, "").split())
+    """What stands before octets, without times; the same for all lines of one sort, however the check of each went."""
+    lead = _CHECKED.sub(r"\1", _WEEKDAY.sub("", lead))
+    return " ".join(_DIGITS.sub("#", WAYS.sub("~", lead)).replace(STAMP, "").split())
 
+
+_CHECKED = re.compile(
+    r"(?<![A-Za-z])((?:err|errors?|crc|lrc|fcs|checksum|check|status|state|result|valid|ok)[\"']?[=:])[\"']?[A-Za-z_]+[\"']?"
+    r"(?=[;,| ])",
+    re.IGNORECASE,
+)
+"""A field that says how the check of a message went."""
 
 _WEEKDAY = re.compile(r"(?<![A-Za-z])(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun)(?:[a-z]{0,6}day)?(?![A-Za-z]),?")
 

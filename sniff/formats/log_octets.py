@@ -291,13 +291,14 @@ def _enough(line: str, begin: int, end: int) -> int:
 
 
 _BEHIND_ONE = r"\s*(?:\(\S{1,6}\)|\([A-Za-z][\w .,:/-]{0,40}\)|'.'|\".\"|[|;].*)?\s*"
-_ALONE = re.compile(rf"(?:^|.*[\s:>\]|#,-])(?P<octet>(?:0[xX])?{H2}){_BEHIND_ONE}")
-_ALONE_UNPADDED = re.compile(rf"(?:^|.*[\s:>\]|#,=-])(?P<octet>[0-9A-Fa-f]{{1,3}}){_BEHIND_ONE}")
+_ALONE = re.compile(rf"(?:^|.*[\s:<>\]|#,-])(?P<octet>(?:0[xX])?{H2}){_BEHIND_ONE}")
+_ALONE_SAID = re.compile(rf"(?:^|.*[\s:<>\]|#,-])(?P<octet>0[xX]{H2}){_BEHIND_ONE}")
+_ALONE_UNPADDED = re.compile(rf"(?:^|.*[\s:<>\]|#,=-])(?P<octet>[0-9A-Fa-f]{{1,3}}){_BEHIND_ONE}")
 
 
 def _single(line: str, base: int) -> Run | None:
     """One octet, as the last word of a line."""
-    match = _ALONE.fullmatch(line) if base == PAIRS_ONLY else None
+    match = (_ALONE_SAID.fullmatch(line) or _ALONE.fullmatch(line)) if base == PAIRS_ONLY else None
     if base != PAIRS_ONLY:
         match = _ALONE_UNPADDED.fullmatch(line)
     if match is None:

@@ -266,18 +266,21 @@ def _goes_on(octets: bytes, after: bytes) -> bool:
 
 
 def _are_headed(lines: Sequence[Line]) -> bool:
-    """Whether above nearly all lines of octets stands one that says their time or direction."""
-    blocks = headed = 0
-    head = in_block = False
+    """Whether above nearly all lines of octets stands one that says their time or direction; one alone does where a
+    known tool says a direction."""
+    blocks = headed = known = 0
+    head = in_block = is_known = False
     for line in lines:
         if line.kind is Kind.OCTETS and line.bare:
             blocks += not in_block
             headed += head and not in_block
-            in_block, head = True, False
+            known += is_known and not in_block
+            in_block, head, is_known = True, False, False
         elif line.kind in (Kind.TEXT, Kind.SHAPE):
             head = (head and not in_block) or line.stamp is not None or bool(line.way)
+            is_known = (is_known and not in_block) or (line.role is Role.HEADING and bool(line.way))
             in_block = False
-    return blocks >= _FIXED_LEAST and headed >= _MOSTLY * blocks
+    return (blocks >= _FIXED_LEAST and headed >= _MOSTLY * blocks) or 0 < blocks == known
 
 
 def _roles(lines: Sequence[Line], main: str, directed: set[str]) -> dict[str, Role | None]:

@@ -139,20 +139,32 @@ SHAPES: tuple[Shape, ...] = (
 )  # fmt: skip
 """The first that is found in a line counts."""
 
+_OF_TSHARK = "the capture itself, or `tshark -x` of it"
+
 DECODED = (
-    (re.compile(r"<pdml[ >]"), "PDML, which has decoded fields and no octets as they were sent"),
-    (re.compile(r"<psml[ >]"), "PSML, which has summaries of packets and no octets"),
-    (re.compile(r'"_index": "packets-'), "JSON of tshark, which has decoded fields and no octets as they were sent"),
+    (re.compile(r"<pdml[ >]"), "PDML, which has decoded fields and no octets as they were sent", _OF_TSHARK),
+    (re.compile(r"<psml[ >]"), "PSML, which has summaries of packets and no octets", _OF_TSHARK),
+    (
+        re.compile(r'"_index": "packets-'),
+        "JSON of tshark, which has decoded fields and no octets as they were sent",
+        _OF_TSHARK,
+    ),
     (
         re.compile(r"\A(?![\s\S]*\buart-\d+: )[\s\S]*\bmodbus-\d+: (?:[a-z-]+: )?\"?Slave ID: \d+"),
-        "annotations of sigrok that have decoded fields and no octets (-A uart has those)",
+        "annotations of sigrok that have decoded fields and no octets",
+        "the capture itself, or `-A uart` of it",
+    ),
+    (
+        re.compile(r"\A(?![\s\S]*(?:Read|Written|Write) data \(COM\d)[\s\S]*Modbus (?:Request|Response) \(COM\d+\)"),
+        "the Modbus view of a serial port monitor, which has decoded fields and no octets as they were sent",
+        "its dump view",
     ),
 )
 """Texts that tell what octets mean, and not which they were."""
 
 WAYS = re.compile(
     r"(?<![A-Za-z0-9_<>=-])(?:>>>|<<<|>>|<<|-->|<--|==>|<==|->|<-|=>|<=|>|<(?![A-Za-z_/]\w*>)|→|←)(?![<>=-])"
-    r"|(?<![A-Za-z])(?:tx[d]?|rx[d]?|sen(?:d|ds|t|ding)|recv|rcv[d]?|receiv(?:e[d]?|ing)|writ(?:e|ing|ten)|wrote|read|"
+    r"|(?<![A-Za-z])(?:tx[d]?|rx[d]?|sen(?:d|ds|t|ding)|transmit(?:s|ted|ting)?|recv|rcv[d]?|receiv(?:e[d]?|ing)|writ(?:e|ing|ten)|wrote|read|"
     r"in|out|input|output|incoming|outgoing|request|response|req|re?sp|query|answer|reply|to|from|"
     r"master|slave|host|device|dte|dce|c1|c2|poll)(?![A-Za-z])",
     re.IGNORECASE,

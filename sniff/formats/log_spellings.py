@@ -47,7 +47,9 @@ CONTROLS = [
     "RS",
     "US",
 ]
-_NAMED = {name: code for code, name in enumerate(CONTROLS)} | {"TAB": 9, "SP": 0x20, "DEL": 0x7F, "NULL": 0}
+_NAMED = {name: code for code, name in enumerate(CONTROLS)} | {
+    "TAB": 9, "SP": 0x20, "SPACE": 0x20, "DEL": 0x7F, "NULL": 0
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,6 +167,17 @@ def _codes(text: str) -> bytes:
     return bytes(int(token) for token in tokens)
 
 
+def _numbered_characters(text: str) -> bytes:
+    """Characters or their names, each with its number behind it: `<SOH> (001) k (107)`, or `k (6b)`."""
+    found = bytearray()
+    for name, character, number in re.findall(r"(?:<([A-Z0-9]{2,5})>|(\S)) \(([0-9a-f]{2,3})\)", text):
+        octet = int(number, 10 if len(number) == 3 else 16)
+        if (name and name not in _NAMED) or (character and octet < 0x7F and octet != ord(character)):
+            raise ValueError("two numbers")
+        found.append(octet)
+    return bytes(found)
+
+
 def _controls(text: str) -> bytes:
     """Characters, and names in angle brackets for those that are none: `<SOH><ETX>A`."""
     found = bytearray()
@@ -183,6 +196,7 @@ def _controls(text: str) -> bytes:
 H2 = r"[0-9A-Fa-f]{2}"
 _BESIDE = r"(?:\((?:0b)?[0-9]{1,8}\)|\[(?:0b)?[0-9]{1,8}\]|/[0-9]{1,3}|\('.'\)|'.')"
 _ESCAPES = rf"(?:\\x{H2}|\\[abtnvfr0\\])"
+_SHOWN = r"<[A-Z0-9]{2,5}>|\S"
 _CONTROL = rf"<(?:{'|'.join(_NAMED)})>"
 _HEX = _by(H2, 16)
 
@@ -195,6 +209,8 @@ SPELLINGS: tuple[Spelling, ...] = (
     Spelling("byte strings", rf"(?:b|bytearray\(b)?{ESCAPED_STRING}(?:(?!(?P=q))[^\\]|\\.)*(?P=q)", None, _escaped, 1,
              before=r"(?<![0-9A-Za-z_])", after=""),
     Spelling("escapes", _ESCAPES, r"[ ,]?", _escapes_alone, 2, before=""),
+    Spelling("characters with their numbers", rf"(?:{_SHOWN}) \((?:\d{{3}}|[0-9a-f]{{2}})\)", " ",
+             _numbered_characters, 2, before=r"(?:(?<=\s)|^)", after=""),
     Spelling("pairs in brackets", rf"(?:\[{H2}\]|<{H2}>|\({H2}\)|\{{{H2}\}})", r"[ ,]?", _HEX, 2, before="",
              after=""),
     Spelling("names of controls", rf"[!-;=?-~]*{_CONTROL}", r"", _controls, 2, after="[!-;=?-~]*",
@@ -216,8 +232,8 @@ SPELLINGS: tuple[Spelling, ...] = (
              _by(r"16#([0-9A-Fa-f]{1,2})", 16), 2),
     Spelling("digits and h", rf"{H2}[hH]", _SEPARATOR, _by(rf"({H2})[hH]", 16), 2),
     Spelling("character codes", r"#\d{1,3}", "", _codes, SURELY, before=r"(?<![0-9A-Za-z_])"),
-    Spelling("digits after a sign", rf"(?:&H|[$%&#]){H2}", r"[ ,;]{0,2}", _by(rf"[H$%&#]({H2})", 16), 2,
-             before=r"(?<![0-9A-Za-z_])"),
+    Spelling("digits after a sign", rf"(?:&H[0-9A-Fa-f]{{1,2}}|[$%&#]{H2})", r"[ ,;]{0,2}",
+             _by(r"[H$%&#]([0-9A-Fa-f]{1,2})", 16), 2, before=r"(?<![0-9A-Za-z_])"),
     Spelling("H and digits", rf"H{H2}", r"[ ,;]{1,2}", _by(rf"H({H2})", 16), 3),
 )  # fmt: skip
 """Those whose digits need no guess, the most special first."""

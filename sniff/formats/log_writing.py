@@ -184,7 +184,14 @@ def _is_aligned(match: re.Match[str]) -> bool:
 
 
 def _squeezed(match: re.Match[str]) -> str:
-    return " ".join(match[0].split()) if _is_aligned(match) else match[0]
+    """Numbers that stand under one another, side by side; digits between other pairs of a line are some of those."""
+    text, begin, end = match.string, *match.span()
+    are_among = _PAIR_AHEAD.search(text, max(0, begin - 12), begin) or _PAIR_BEHIND.match(text, end)
+    return " ".join(match[0].split()) if _is_aligned(match) and not are_among else match[0]
+
+
+_PAIR_AHEAD = re.compile(r"(?<![0-9A-Za-z])(?=[0-9]?[A-Fa-f])[0-9A-Fa-f]{2} {1,8}$")
+_PAIR_BEHIND = re.compile(r" {1,8}(?=[0-9]?[A-Fa-f])[0-9A-Fa-f]{2}(?![0-9A-Za-z])")
 
 
 _H = "[0-9A-Fa-f]{2}"
