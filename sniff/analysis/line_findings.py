@@ -53,12 +53,14 @@ READ_LATE = MS
 
 
 class _Stray(NamedTuple):
-    """Stray octets beside a frame; `asker`: who had asked before them, where an answer was due; `asked`: whom."""
+    """Stray octets beside a frame; `asker`: who had asked before them, where an answer was due; `asked`: whom; `joins`:
+    they began where that frame ended."""
 
     no: int
     noise: Noise
     asker: str | None
     asked: str | None
+    joins: bool
 
     def told(self, sender: str) -> tuple[str, str]:
         """Whose they are and by which rule, once `sender` has sent a frame.
@@ -217,6 +219,8 @@ class LineFindings:
             for stray in self._pending:
                 name, code = stray.told(sender)
                 self._senders.stray(name, code, stray.no, stray.noise)
+                if code == "LN203" and stray.joins and stray.asker is not None:
+                    self._senders.of(stray.asker).joined.add(stray.no, stray.noise)
                 self._count_instead(code == "LN203", stray.asked)
             if self._asker is not None and sender in (self._asker, BUS):  # as in `_Stray.told`
                 self._count_instead(self._awaited, self._called_last)
@@ -255,7 +259,7 @@ class LineFindings:
             self._remains.add(no, noise, None if self._asker is None else self._called_last)
             self._pieces.count_remains(len(noise.octets))
         elif noise.place is Place.BEFORE or (noise.place is Place.AFTER and self._asker is not None):
-            self._pending.append(_Stray(no, noise, self._asker, self._called_last))
+            self._pending.append(_Stray(no, noise, self._asker, self._called_last, self._senders.joins(noise)))
             del self._pending[:-8]
         elif noise.place is Place.AFTER and self._senders.before is not None:
             self._begins.add(self._senders, self._senders.before, "LN202", no, noise)

@@ -228,6 +228,18 @@ _ALL = (
         explains=("LN204", "LN301", "LN302", "LN303", "MB005", "MB007", "MB009", "N2004", "MS401", "MS402"),
     ),
     Rule(
+        "LN207",
+        Severity.WARNING,
+        "octets put behind frames",
+        "The same octets, three at most, directly behind 9 in 10 frames of one sender, at least five: two or more, or "
+        "one that no change of the level makes. Those of a master are only noted where stations answer all the same, "
+        "and an error where no station is heard.",
+        "the program that sends adds them (a line end as of a terminal, a check over a frame and its check, which is "
+        "00 00), or a converter on the way; of octets like 00 and FF it may be the driver that lets go late",
+        "that program: frames as they are, without a line end, the check once; the converter",
+        explains=("LN204", "MB001", "MB002", "MB004", "MB020", "MB104", "MB105"),
+    ),
+    Rule(
         "LN301",
         Severity.WARNING,
         "disturbances in step with the mains",

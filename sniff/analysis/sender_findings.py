@@ -16,6 +16,7 @@ from dissectors.frame import Damage, Event, Frame, LineError, Mark, Noise, Role
 from dissectors.line import Timing
 from dissectors.strikes import Strikes
 from dissectors.subject import as_subject
+from sniff.analysis.appended import Behind
 from sniff.analysis.breaks import Breaks
 from sniff.analysis.flag_runs import FlagRuns
 from sniff.analysis.line_rules import LINE_RULES as RULES
@@ -52,6 +53,8 @@ class Sender:
     at: Counter[str] = field(default_factory=Counter)  # place of the wrong octets in the frame
     stray: dict[str, Tally] = field(default_factory=dict)  # by rule
     values: Counter[tuple[str, int]] = field(default_factory=Counter)  # of those octets, by rule
+    behind: Behind = field(default_factory=Behind)  # strays behind its frames
+    joined: Behind = field(default_factory=Behind)  # those in silence (LN203) that began where a frame of it ended
 
 
 class Senders:
@@ -63,6 +66,7 @@ class Senders:
         self._runs = FlagRuns()
         self.beside = timing.latency <= timing.t35  # else octets beside a frame may be far from it
         self._near = timing.latency + NEAR * timing.char
+        self._at_once = timing.char
         self._end = 0  # of the frame before
         self.by_name: dict[str, Sender] = {}
         self.frames = 0
@@ -89,6 +93,10 @@ class Senders:
             if not (self._goes_on and marked[0] == 0):
                 self._close_packet()
             self._is_foreign, self._goes_on = True, marked[-1] == len(event.octets) - 1
+
+    def joins(self, event: Event) -> bool:
+        """Whether an event begins where the newest frame ended, as far as times tell: nobody else can be as quick."""
+        return self.beside and event.start - self._end <= self._at_once
 
     def of(self, name: str) -> Sender:
         """A sender; one beyond the limit is not kept."""
@@ -158,6 +166,8 @@ class Senders:
         sender = self.of(name)
         sender.stray.setdefault(code, Tally()).add(noise.start, no)
         sender.values.update((code, octet) for octet in noise.octets)
+        if code == "LN202":
+            sender.behind.add(no, noise)
 
     def put_back(self, name: str, code: str, noise: Noise, before: Tally | None) -> None:
         """Forget the newest stray octets of a sender by a rule; `before`: what was counted of them until then."""
@@ -167,6 +177,8 @@ class Senders:
         else:
             sender.stray[code] = before
         sender.values -= Counter((code, octet) for octet in noise.octets)
+        if code == "LN202":
+            sender.behind.take_back(noise)
 
     def _see_packet(self, name: str, no: int, frame: Frame, wrong: list[Mark]) -> None:
         """Gather who sent in one packet with a flag: its marks run from octet to octet, over frames."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, times, together
+from sniff.analysis.appended import Behind, appended_to, as_appended
 from sniff.analysis.breaks import LEVELS
 from sniff.analysis.line_rules import LINE_RULES as RULES
-from sniff.analysis.sender_findings import BUS, MASTER, NoteIf, Senders
+from sniff.analysis.sender_findings import BUS, MASTER, NoteIf, Sender, Senders
 from sniff.analysis.shares import only_struck, standing_out
 
 INSTEAD_LEAST, INSTEAD = 3, 0.7
@@ -19,13 +20,14 @@ INSTEAD_LEAST, INSTEAD = 3, 0.7
 def strays_found(senders: Senders, instead: Counter[str], note_if: NoteIf) -> Iterator[Finding]:
     """Stray octets: of a sender that has more than its share of them, else of the bus, told once. `instead`: how many
     came in place of an answer, by the station that was asked."""
+    by_name = _settled(senders.by_name)
     own: list[tuple[str, str]] = []
     common: dict[str, list[str]] = {"LN201": [], "LN202": []}
     only: dict[str, bool] = {}  # whether chance would hardly have struck one sender alone
     for code, names in common.items():
         counts = {
             name: (one.stray[code].count if code in one.stray else 0, float(one.frames))
-            for name, one in senders.by_name.items()
+            for name, one in by_name.items()
             if name != BUS
         }
         out = standing_out(counts, MASTER)
@@ -34,10 +36,10 @@ def strays_found(senders: Senders, instead: Counter[str], note_if: NoteIf) -> It
             out.discard(MASTER)
         own += [(name, code) for name in sorted(out)]
         names += sorted(name for name, (count, _) in counts.items() if count and name not in out)
-        if BUS in senders.by_name and code in senders.by_name[BUS].stray:  # beside a frame of nobody knows whom
+        if BUS in by_name and code in by_name[BUS].stray:  # beside a frame of nobody knows whom
             names.append(BUS)
-    silence = senders.by_name[BUS].stray.get("LN203") if BUS in senders.by_name else None
-    among = {code: together(senders.by_name[name].stray[code] for name in names) for code, names in common.items()}
+    silence = by_name[BUS].stray.get("LN203") if BUS in by_name else None
+    among = {code: together(by_name[name].stray[code] for name in names) for code, names in common.items()}
     total = sum(tally.count for tally in among.values()) + (silence.count if silence is not None else 0)
     for code, names in common.items():
         alone = names[0] if len(names) == 1 else BUS
@@ -49,19 +51,61 @@ def strays_found(senders: Senders, instead: Counter[str], note_if: NoteIf) -> It
     of_own = 0
     told: list[tuple[Finding, set[int]]] = []
     for name, code in own:
-        record = senders.by_name[name]
+        record = by_name[name]
         of_own += record.stray[code].count
         found = _stray_finding(code, name, record.values, record.stray[code], record.frames, note_if)
+        if code == "LN202":
+            found = _of_sender(found, record, bool(by_name.keys() - {BUS, MASTER}))
         told.append((found, {value for rule, value in record.values if rule == code}))
         yield found
     if total:
-        found, values = _of_all(senders, among, silence, common, note_if)
+        found, values = _of_all(senders, by_name, among, silence, common, note_if)
         found = _of_one_asked(found, instead, senders)
         theirs = [one for one, own_values in told if values.keys() <= own_values and total <= one.count]
         if theirs:  # the same octets, seen apart from the frame
             yield as_consequence(found, theirs[0], RULES)
         else:
             yield replace(found, severity=Severity.NOTE) if 3 * total <= of_own else found  # most likely theirs too
+
+
+def _settled(by_name: Mapping[str, Sender]) -> dict[str, Sender]:
+    """The senders, where the master puts octets behind its frames itself: those of frames that nobody answers are its
+    own, too, and so are those behind frames of nobody knows whom, where no station is heard: a write that is sent again
+    may be its answer."""
+    made = dict(by_name)
+    master, unknown = made.get(MASTER), made.get(BUS)
+    if master is None or unknown is None:
+        return made
+    behind = [master.behind, master.joined]
+    frames = master.frames
+    alone = made.keys() == {BUS, MASTER} and unknown.behind.tally.count > 0
+    if alone:
+        behind.append(unknown.behind)
+        frames += unknown.frames
+    octets = sum((one.octets for one in behind), Counter[bytes]())
+    if appended_to(octets, sum(one.tally.count for one in behind), frames) is None:
+        return made
+    joined, apart = master.joined.tally, dict(unknown.stray)
+    if (silence := apart.pop("LN203", None)) is not None and silence.count > joined.count:
+        apart["LN203"] = replace(silence, count=silence.count - joined.count)
+    if alone:
+        apart.pop("LN202", None)
+    made[BUS] = replace(unknown, stray=apart)
+    made[MASTER] = replace(
+        master,
+        frames=frames,
+        stray={**master.stray, "LN202": together(one.tally for one in behind if one.tally.count)},
+        behind=Behind(octets=octets),
+    )
+    return made
+
+
+def _of_sender(finding: Finding, record: Sender, others: bool) -> Finding:
+    """What is found of strays behind one sender's frames: are they its own doing? `others`: stations are heard."""
+    octets = appended_to(record.behind.octets, finding.count, record.frames)
+    if octets is None:
+        return finding
+    return as_appended(finding, octets, record.frames, others if finding.subject == MASTER else None)
 
 
 def _of_one_asked(finding: Finding, instead: Counter[str], senders: Senders) -> Finding:
@@ -81,15 +125,20 @@ def _of_one_asked(finding: Finding, instead: Counter[str], senders: Senders) -> 
 
 
 def _of_all(
-    senders: Senders, among: dict[str, Tally], silence: Tally | None, names: dict[str, list[str]], note_if: NoteIf
+    senders: Senders,
+    by_name: Mapping[str, Sender],
+    among: dict[str, Tally],
+    silence: Tally | None,
+    names: dict[str, list[str]],
+    note_if: NoteIf,
 ) -> tuple[Finding, Counter[int]]:
     """One finding about noise that no sender stands out by, and the octets that it is."""
     values: Counter[tuple[str, int]] = Counter()
     for code in among:
         for name in names[code]:
-            values.update({key: n for key, n in senders.by_name[name].values.items() if key[0] == code})
+            values.update({key: n for key, n in by_name[name].values.items() if key[0] == code})
     if silence is not None:
-        values.update({key: n for key, n in senders.by_name[BUS].values.items() if key[0] == "LN203"})
+        values.update({key: n for key, n in by_name[BUS].values.items() if key[0] == "LN203"})
         among = {**among, "LN203": silence}
     tally = together(among.values())
     code = max(among, key=lambda one: among[one].count)

@@ -45,6 +45,21 @@ class AtTimes:
 
 
 @dataclass(frozen=True, slots=True)
+class PutBehind:
+    """A sender whose program puts the same octets behind all that it sends."""
+
+    party: str
+    octets: bytes
+    name: ClassVar[str] = "put-behind"
+
+    def strike(self, sent: Transmission, now: int, line: LineSettings, dice: Random) -> tuple[Transmission, ...]:
+        """Add them."""
+        if sent.party != self.party or not sent.octets:
+            return (sent,)
+        return (sent.hit(self.name, octets=sent.octets + self.octets),)
+
+
+@dataclass(frozen=True, slots=True)
 class Anywhere:
     """A few random octets anywhere in the silence behind a transmission, `rate` for each."""
 
