@@ -56,7 +56,7 @@ class BulkRingObserver(MstpRingObserver):
         is_token, asks = bool(columns.token[before]), bool(columns.asks[before])
         if self._doubt or self._missed is not None or self._before is None or not self._reads.is_settled:
             return False
-        if self._repeated.of is not None or self._holder != int(columns.after[before]):
+        if self._instead is not None or self._repeated.of is not None or self._holder != int(columns.after[before]):
             return False
         if (self._token is not None) != is_token:
             return False

@@ -25,7 +25,7 @@ from dissectors.bacnet.searches import PollSeries
 from dissectors.bacnet.storms import Storms
 from dissectors.bacnet.token_watch import AT_ONCE, TokenWatch
 from dissectors.bacnet.turn import Turn
-from dissectors.frame import Damage, Event, Frame, Header, Noise, Role
+from dissectors.frame import Check, Damage, Event, Frame, Header, Noise, Role
 from dissectors.line import Timing
 
 _TOKEN, _POLL, _POLL_REPLY, _TEST, _TEST_REPLY, _POSTPONED = map(
@@ -79,6 +79,7 @@ class MstpRingObserver(TokenWatch):
                     self._note_overdue(no, event.start)
                     self._questions.asked = None
                     self._disturb(no, event.start)
+                    self._damaged = event.end
                 self._doubt, self._broke_off, self._disturbed = True, False, True
             else:
                 self._see_hole(event.start)
@@ -87,7 +88,7 @@ class MstpRingObserver(TokenWatch):
             tally.octets += len(event.octets)
             for late in self._reads.settle(event):
                 tally.note(late.what, late.time, late.no, late.mac, late.other, late.value)
-            if not event.ok and event.damage is not Damage.LONG:
+            if not event.ok and not (event.damage is Damage.LONG and event.check is Check.GOOD):
                 self._see_damage(no, event, header)
             elif header.source is not None and header.destination is not None and header.function is not None:
                 self._see_good(no, event, header.function, header.source, header.destination, header)
@@ -147,15 +148,19 @@ class MstpRingObserver(TokenWatch):
             tally.note(RingEventKind.OVERDUE, frame.start, no, None, None if speaker is None else speaker.source)
         count_damage(tally, no, frame, None if self._disturb(no, frame.start) else speaker)
         self._questions.asked = None
-        if asked is None or speaker is None or asked.frame_type == _POLL:
-            pass
-        elif (speaker.source, speaker.destination) == (asked.destination, asked.source):
+        is_reply = False
+        if asked is not None and speaker is not None and asked.frame_type != _POLL:
+            is_reply = asked.waits_for(speaker.source, speaker.destination)
+        if asked is not None and is_reply:
             tally.note(RingEventKind.DAMAGED_REPLY, frame.start, no, asked.destination, asked.source)
         if is_whole_header(frame) and header.function in (*EXPECTING, _TEST) and header.destination != BROADCAST:
             assert header.source is not None
             assert header.destination is not None
-            self._questions.asked = AskedInRing(header.function, header.source, header.destination, frame, no)
+            asked = AskedInRing(header.function, header.source, header.destination, frame, no)
+            asked.free = is_reply  # one that wants an answer by its type is a segment
+            self._questions.asked = asked
         self._doubt = self._disturbed = True
+        self._damaged = frame.end
 
     def _note_overdue(self, no: int, start: int) -> bool:
         """Whether answers are overdue where something is damaged; note whose."""
@@ -202,7 +207,9 @@ class MstpRingObserver(TokenWatch):
             self._disturbed = True
         self._breaks_in = source != self._holder and (not answers or self._questions.late is not None)
         if self._doubt and not answers and frame_type in AT_ONCE:
-            self._answers_unread(destination)
+            self._hold_now(destination)
+        elif answers and asked is not None and not asked.frame.ok and asked.waits_for(source, destination):
+            self._answers_damaged(asked, frame_type, header)
         if frame_type == _TOKEN:
             if not answers:
                 self._take_turn(no, frame, source, node, header)

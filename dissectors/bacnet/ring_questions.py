@@ -55,6 +55,10 @@ class AskedInRing:
     free: bool = False
     usurped: bool = False
 
+    def waits_for(self, source: int, destination: int | None) -> bool:
+        """Whether an answer from `source` to `destination` is what it waits for."""
+        return source == self.destination and destination == self.source
+
 
 class RingQuestions:
     """`asked` is what must be answered now; those given up, and those postponed, are remembered, bounded.
@@ -148,7 +152,7 @@ class RingQuestions:
     def _answers(
         self, asked: AskedInRing, no: int, frame: Frame, frame_type: int, source: int, destination: int, node: NodeTally
     ) -> bool:
-        back = source == asked.destination and destination == asked.source
+        back = asked.waits_for(source, destination)
         took = frame.start - asked.frame.end
         if asked.frame_type == _POLL:
             if not back or frame_type != FrameType.REPLY_TO_POLL_FOR_MASTER:
@@ -206,15 +210,15 @@ class RingQuestions:
             self._tally.note(RingEventKind.TOO_SOON, frame.start, no, asked.source, asked.destination, took)
 
     def _unanswered_request(self, asked: AskedInRing, frame: Frame) -> None:
-        if asked.free or not asked.frame.ok:  # it may have been damaged for everybody
+        if asked.free:
             return
         key = asked.destination, asked.source
         self._unanswered[key] = asked
         self._unanswered.move_to_end(key)
         if len(self._unanswered) > _UNANSWERED_MAX:
             self._unanswered.popitem(last=False)
-        if self.doubt or more_follows(asked.frame) or self._is_owed(frame):
-            return
+        if self.doubt or not asked.frame.ok or more_follows(asked.frame) or self._is_owed(frame):
+            return  # one that was damaged may have been so for everybody
         if asked.usurped and not surely_over(frame, asked.frame, T_REPLY_DELAY):
             return  # who asked went on with the other one's answer
         if self._unheard.answered(asked.no, asked.frame, frame):

@@ -15,7 +15,13 @@ from dissectors.bacnet.limits import BROADCAST, MAX_MASTER, T_NO_TOKEN, T_USAGE_
 from dissectors.bacnet.lost_tokens import longest_wait, makes_token
 from dissectors.bacnet.repeated_token import RepeatedToken
 from dissectors.bacnet.ring_events import RingEvent, RingEventKind
-from dissectors.bacnet.ring_questions import RingQuestions, is_proprietary_answer, is_second_answer
+from dissectors.bacnet.ring_questions import (
+    T_LATE_ANSWER,
+    AskedInRing,
+    RingQuestions,
+    is_proprietary_answer,
+    is_second_answer,
+)
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
 from dissectors.bacnet.ring_window import Happening
 from dissectors.bacnet.searches import begin_search, end_search
@@ -45,11 +51,13 @@ class TokenWatch:
         self._token: Frame | None = None  # that token, while unused
         self._disturbed = False  # since then others spoke, or octets came that may have been its use
         self._second = SecondTokens(self._tally)
+        self._instead: int | None = None  # who has the token, if the holder's newest frame was an answer to it
         self._repeated = RepeatedToken()
         self._got: int | None = None  # when the holder got the token
         self._hold = 0  # data frames sent on this token
         self._doubt = True  # something may have been missed since the last good frame
         self._breaks_in = False  # whether the last good frame was unasked, and its sender had no token
+        self._damaged: int | None = None  # the end of the newest octets that may have been a frame, and are none
         self._broke_off = False  # that is a frame of the holder that was cut short, and nothing else
         self._before: Frame | None = None  # the last good frame
         self._quiet_since: int | None = None  # end of the last event of any kind
@@ -132,11 +140,16 @@ class TokenWatch:
                         what = RingEventKind.LATE_ASKING if _waits(frame) else RingEventKind.LATE_USE
                         self._late(what, no, frame, source, self._passed_by, gap)
                 self._token = self._passed_by = None
+            self._instead = header.destination if self._doubt and self._may_answer(frame, header) else None
             return
         if self._doubt and self._may_answer(frame, header):
             self._forget()
             return
-        if self._was_asked(no, frame, source, header):
+        if source == self._instead:  # the token went that way in the octets before the answer
+            self._forget()
+            self._holder = source
+            return
+        if self._may_be_late(frame, header) or self._was_asked(no, frame, source, header):
             return
         if source == self._passed_by:  # nobody used it: it is repeated, or somebody else is looked for
             if not self._came_back(no, frame, source):
@@ -240,9 +253,25 @@ class TokenWatch:
         alone = header.role is Role.REQUEST or frame.octets[2] in (_TOKEN, _POLL)
         return not alone and header.destination != BROADCAST
 
-    def _answers_unread(self, asker: int) -> None:
-        """An answer that only comes at once, behind octets that are no good frame: they were the question, and who
-        asked it has the token."""
+    def _may_be_late(self, frame: Frame, header: Header) -> bool:
+        """Whether it answers what may have been octets that are no good frame: its asker may have given up since, and
+        passed the token on."""
+        if header.role is not Role.RESPONSE or self._damaged is None:
+            return False
+        return frame.start - self._damaged <= T_LATE_ANSWER
+
+    def _answers_damaged(self, asked: AskedInRing, frame_type: int, header: Header) -> None:
+        """An answer to a frame that is damaged, but for its header: it shows who has the token, where it is known
+        which of both asked. An acknowledge may be for a segment, which is an answer itself."""
+        if asked.free:
+            self._hold_now(asked.destination)
+        elif frame_type in AT_ONCE or header.role is Role.RESPONSE:
+            self._hold_now(asked.source)
+        else:
+            self._forget()
+
+    def _hold_now(self, asker: int) -> None:
+        """Who asks, or asked in octets that are no good frame what comes at once or not at all, has the token."""
         if asker != self._holder:
             self._forget()
             self._holder = asker
@@ -305,7 +334,7 @@ class TokenWatch:
         self._second.passed(destination)
         self._unheard.heard(destination)
         self._holder, self._passed_by, self._token = destination, source, frame
-        self._disturbed = False
+        self._disturbed, self._instead = False, None
 
     def _late(self, what: RingEventKind, no: int, frame: Frame, mac: int, other: int | None, value: int) -> None:
         """Something was late, unless the next frame shows that the read was."""
@@ -323,7 +352,7 @@ class TokenWatch:
     def _forget(self) -> None:
         self._questions.asked = None
         self._holder = self._passed_by = self._token = self._second.of = self._got = None
-        self._hold = 0
+        self._hold, self._instead = 0, None
         self._unheard.forget()
 
 
