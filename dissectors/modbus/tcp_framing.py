@@ -19,6 +19,8 @@ HEADER: Final = 6
 """Octets before the unit."""
 LONGEST: Final = HEADER + 254
 _LEAST = 8  # up to the function
+_REFUSAL = 3
+"""Unit, function and code of an exception."""
 
 
 class TcpFramer(PlainFramer):
@@ -55,6 +57,8 @@ def expected(begin: bytes) -> int | None:
     size = begin[5] if len(begin) > 5 else 2
     if not 2 <= size <= LONGEST - HEADER or (len(begin) > 7 and not begin[7] & 0x7F):
         return None
+    if len(begin) > 7 and begin[7] & 0x80 and size < _REFUSAL:
+        return None  # as an RTU request of two registers 0 with its CRC
     return HEADER + size if len(begin) == _LEAST else 0
 
 

@@ -54,6 +54,7 @@ class Assembly:
         self._any = self._clocked = False  # whether anything was told, and whether with a time
         self._told_last: int | None = None
         self._placing = Placing()
+        self._first: Line | None = None  # of two that are the same
         self._shift = 0
         self._shift_before: int | None = None  # before the clock was set back last
         self._day = 0
@@ -135,6 +136,9 @@ class Assembly:
             is_below = self._heading is not None and not self._used and not self._plan.labelled
             is_more = bool(self._plan.width or self._goes_on or self._held)
             role = role if not line.bare or is_more or is_below else Role.NOTHING
+        if role is Role.DATA and (line.family, line.way) in self._plan.doubled:
+            is_second, self._first = line == self._first, line if line != self._first else None
+            role = Role.SAME if is_second else role
         if role is Role.SAME:
             self.was = Kind.SHAPE
             return
@@ -151,6 +155,9 @@ class Assembly:
             return
         if line.cut:
             self.was = Kind.STRANGE
+        elif line.whole is not None and (octets := line.whole(line.octets)) != line.octets:
+            line = replace(line, octets=octets)
+            self.completed += 1
         if self._again and line.family == self._again and line.octets.startswith(bytes(self._held)):
             self._begin(line, line.way)
         elif self._joins(line):

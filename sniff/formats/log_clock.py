@@ -179,6 +179,8 @@ CLOCKS: tuple[Clock, ...] = (
                                             r"(?P<day>\d{1,2})[日일] *" + _TIME), _named_month, dated=True),
     Clock("month, day and time", _clock(r"(?P<month>0[1-9]|1[0-2])[-/](?P<day>0[1-9]|[12]\d|3[01])[ T]" + _TIME),
           _named_month, dated=True, first=True),
+    Clock("time and date", _clock(rf"{_TIME},? (?P<date>\d{{1,4}}/\d{{1,2}}/\d{{1,4}})(?![0-9A-Za-z/.:-])"), _dated,
+          dated=True),
     Clock("days and time of day", _clock(rf"(?P<days>\d{{1,4}}):(?=\d\d:){_TIME}"), _days, first=True),
     Clock("time of day", _clock(_TIME), _of_day, daily=True),
     Clock("time of day behind a label", re.compile(
@@ -206,7 +208,7 @@ CLOCKS: tuple[Clock, ...] = (
           _scaled(MS // 1000), unit=MS // 1000),
     Clock("a named number", re.compile(
               r"(?<![0-9A-Za-z])(?:ts|t|time|timestamp|zeit|uptime|elapsed|millis)(?:[_ ]?(?P<unit>ms|us|ns|s))?\"?"
-              r"\s*[:=]\s*\"?(?P<number>-?\d{1,19}(?:\.\d{1,9})?)(?:\s?(?P<unit_behind>ms|us|µs|ns|s))?(?![0-9A-Za-z:.-])",
+              r"\s*[:=]\s*\"?(?P<number>-?\d{1,19}(?:\.\d{1,9})?)(?:\s?(?P<unit_behind>ms|us|µs|ns|s))?(?![0-9A-Za-z:-]|\.\d)",
               re.IGNORECASE), _named),
     Clock("µs of usbmon", re.compile(
               r"(?:(?<=^[0-9a-f]{16} )|(?<=^[0-9a-f]{8} ))(?P<number>\d{1,12})(?= [SCE] [BCIZ][io]:)"),

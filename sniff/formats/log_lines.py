@@ -89,7 +89,7 @@ class Line:
     goes_on: bool = False
     """Whether it ends as a line that another continues."""
     whole: Callable[[bytes], bytes] | None = None
-    """What makes the octets below it those that were sent."""
+    """What makes its octets, or those below it, what was sent."""
 
 
 EMPTY, REMARKED = Line(Kind.EMPTY), Line(Kind.REMARK)
@@ -111,7 +111,8 @@ def _taken_apart(text: str, base: int, rows: bool, times: Times, least: int) -> 
         return REMARKED
     stamp, text = without_stamps(text, times)
     known = shape_of(text)
-    if rows and (known is None or known[0].role is not Role.DATA or "octets" not in known[1].re.groupindex):
+    has_octets = known is not None and known[0].role in _TELLING and "octets" in known[1].re.groupindex
+    if rows and not has_octets:
         row = _row(text, stamp)
         if row is not None:
             return row
@@ -122,7 +123,7 @@ def _taken_apart(text: str, base: int, rows: bool, times: Times, least: int) -> 
     way = groups.get("way") or ""
     if shape.role is Role.HEADING and (found := octets_in(text, base)) is not None and len(found.octets) > 2:
         return Line(Kind.OCTETS, stamp, way, found.octets, shape.tool, False, Role.DATA, shape.tool, found.spelling)
-    if shape.role is not Role.DATA:
+    if shape.role not in _TELLING:
         return Line(Kind.SHAPE, stamp, way, role=shape.role, tool=shape.tool, whole=shape.whole)
     told = groups.get("octets")
     run = octets_in(text if told is None else told, base)
@@ -134,14 +135,21 @@ def _taken_apart(text: str, base: int, rows: bool, times: Times, least: int) -> 
     samples = (int(begin[:18]), int(end[:18])) if begin and end else None
     if not way and told is None:
         way = way_of(text[: run.begin])
+    if shape.role is Role.PERHAPS and told is not None:
+        lead = text[: match.start("octets")]
+        return Line(
+            Kind.OCTETS, stamp, way or way_of(lead), run.octets, label_of(lead), spelling=run.spelling,
+            cut=bool(groups.get("cut")), broken=run.broken, whole=shape.whole,
+        )  # fmt: skip
     is_cut = bool(groups.get("cut")) or int(groups.get("count") or 0) > len(run.octets)
     return Line(
         Kind.OCTETS, stamp, way, run.octets, shape.tool, False, Role.DATA, shape.tool, run.spelling,
-        samples=samples, cut=is_cut, broken=run.broken,
+        samples=samples, cut=is_cut, broken=run.broken, whole=shape.whole,
         more=_more(text, run, base) if told is None else (),
     )  # fmt: skip
 
 
+_TELLING = (Role.DATA, Role.PERHAPS)
 _remembered = lru_cache(REMEMBERED)(_taken_apart)
 
 
@@ -223,18 +231,17 @@ _COLUMN_BESIDE = re.compile(r"[ \t]*[|;]?[ \t]+(?=[0-9A-Fa-f(\[<{])")
 
 
 def label_of(lead: str) -> str:
-    """What stands before octets, without times; the same for all lines of one sort, however the check of each went."""
-    lead = _CHECKED.sub(r"\1", _WEEKDAY.sub("", lead))
-    return " ".join(_DIGITS.sub("#", WAYS.sub("~", lead)).replace(STAMP, "").split())
+    """What stands before octets, without times; the same for all lines of one sort."""
+    return " ".join(_DIGITS.sub("#", WAYS.sub("~", _WEEKDAY.sub("", lead))).replace(STAMP, "").split())
 
 
-_CHECKED = re.compile(
-    r"(?<![A-Za-z])((?:err|errors?|crc|lrc|fcs|checksum|check|status|state|result|valid|ok)[\"']?[=:])[\"']?[A-Za-z_]+[\"']?"
-    r"(?=[;,| ])",
-    re.IGNORECASE,
-)
-"""A field that says how the check of a message went."""
+def key_of(family: str) -> str:
+    """The name right before octets, of a label that is names with values: `ERR=BAD_CRC;FRAME=`; "" of another."""
+    match = _KEY.search(family)
+    return match[1] if match is not None and family.count("=") > 1 else ""
 
+
+_KEY = re.compile(r"[;,|&\s](\w+=)$")
 _WEEKDAY = re.compile(r"(?<![A-Za-z])(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun)(?:[a-z]{0,6}day)?(?![A-Za-z]),?")
 
 

@@ -121,6 +121,9 @@ def _digits(line: str, base: int) -> Run | None:
     while (match := _DIGITS.search(line, at)) is not None:
         tokens = _TOKEN.findall(match[0])
         at = match.start() + len(tokens[0]) if len(tokens) < 4 else match.end()  # a number may stand before the octets
+        if match["between"] == "/" and _is_date(tokens):
+            at = match.end()
+            continue
         run = _numbers(line, match, tokens, base) if len(tokens) > 1 else None
         if run is not None and (best is None or len(run.octets) > len(best.octets)):
             best = run
@@ -160,6 +163,14 @@ def _octet(token: str, base: int) -> int | None:
     except ValueError:
         return None
     return number if number < 256 else None
+
+
+def _is_date(tokens: list[str]) -> bool:
+    """Whether three numbers between slashes are a day, a month and a year."""
+    if len(tokens) != 3 or not all(token.isdigit() and len(token) == 2 for token in tokens):
+        return False
+    first, second, third = map(int, tokens)
+    return any(0 < month <= 12 and 0 < day <= 31 for month, day in ((first, second), (second, first), (second, third)))
 
 
 _DECIMAL = re.compile(r"0|[1-9]\d{0,2}")
@@ -262,6 +273,8 @@ def _words(line: str, least: int = 0) -> Run | None:
     return best
 
 
+_COMPARED = ("!=", "==")
+"""Between two numbers of which a program says whether they are the same."""
 _CLOSING = " \t\"'`)]}>,;"
 _WAY_AHEAD = re.compile(rf"(?:{WAYS.pattern})[\s:,;=|>\]\"'-]{{1,4}}$", re.IGNORECASE)
 _KEY_AHEAD = re.compile(r"(?:raw|hex|data|payload|frame|bytes|octets)['\"]?\s*[:=]\s*['\"]$", re.IGNORECASE)
@@ -279,6 +292,8 @@ def _enough(line: str, begin: int, end: int) -> int:
     a direction stands before what only closing signs are behind."""
     before, rest = line[begin - 1 : begin], line[end:]
     alone = not rest.strip()
+    if line[max(0, begin - 3) : begin].rstrip().endswith(_COMPARED):
+        return 18
     if before in ("x", "X"):  # a shorter one is an address
         return 10 if alone else 18
     if before in _QUOTES and rest[:1] == before and before:

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from sniff.formats.log_clock import Stamp
-from sniff.formats.log_lines import Kind, Line, label_of, way_of, without_stamps
+from sniff.formats.log_lines import Kind, Line, key_of, label_of, way_of, without_stamps
 from sniff.formats.log_octets import octets_in
 from sniff.formats.log_pieces import LONGEST, SPACES
 from sniff.formats.log_shapes import COLOURS, STAMP, WAYS, Role
@@ -114,7 +114,10 @@ def _octets(text: str, spelling: str) -> bytes:
 
 
 def _outline(spelling: str, text: str, begin: int, end: int, octets: bytes) -> Outline:
-    return Outline(spelling, _general(text[:begin]), _general(_without_characters(text[end:], octets)))
+    lead, tail = _general(text[:begin]), _general(_without_characters(text[end:], octets))
+    if (key := key_of(lead)) != "":  # names with values, which lines of one print have others of
+        lead, tail = key, tail.partition("=")[0]
+    return Outline(spelling, lead, tail)
 
 
 def _general(text: str) -> str:

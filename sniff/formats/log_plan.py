@@ -13,15 +13,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby, pairwise
 
-from dissectors.line import MS
+from dissectors.checksums import ends_with_crc16
 from sniff.formats.dump_plan import heads_of, offsets_of
-from sniff.formats.log_lines import Kind, Line, line_of, numbers_of
+from sniff.formats.log_lines import Kind, Line, key_of, line_of, numbers_of
 from sniff.formats.log_margin import NO_MARGIN, Margin, margin_of
 from sniff.formats.log_numbers import base_of
 from sniff.formats.log_octets import PAIRS_ONLY
 from sniff.formats.log_outline import Outline, outlines_of, short_line
+from sniff.formats.log_repeats import FEW, doubled, echoing, growing
 from sniff.formats.log_rewriting import are_codes, as_codes, with_escapes
 from sniff.formats.log_shapes import Role
+from sniff.formats.log_spellings import SURELY
 from sniff.formats.log_times import AS_WRITTEN, FASTEST, Times, counted, number_ahead, order_of
 from sniff.formats.usb_serial import STATUS, begin_with_status
 
@@ -38,10 +40,10 @@ _STRINGS = "byte strings"
 _JOINED, _SHORT = "digits without space", 6
 """Digits of the shortest frame, on lines of which longer ones are known."""
 
+_NUMBERS = "numbers"
 _REPEATS = 0.6
 _NUMBERED = 0.6
 _MOSTLY = 0.8
-_GROWN = 0.2
 _TELLING = 3
 _NO_WORD = 64  # octets of one line that stands alone under a letter
 _BACK = 0.2
@@ -58,9 +60,10 @@ class Plan:
     an octet a line. `bit_samples`: samples of a bit, of a logic analyser; 0 where there are none.
     `spellings`: how octets are written. `margin`, `times`: what is no part of the lines, how their times are read.
     `timed`: whether lines have times. `heads`: those above rows that repeat others. `growing`: labels whose lines tell
-    what was heard so far, so that the next has the same with more behind. `labelled`: whether lines with octets have a
-    label; `lower`: whether their digits are small letters; `with_status`: whether what a USB adapter sent begins with
-    its status; `in_codes`: whether digits behind # are decimal.
+    what was heard so far, so that the next has the same with more behind; `doubled`: labels and directions whose lines
+    all come twice. `labelled`: whether lines with octets have a label; `lower`: whether their digits are small letters;
+    `with_status`: whether what a USB adapter sent begins with its status; `in_codes`: whether digits behind # are
+    decimal.
     """
 
     kind: str
@@ -79,6 +82,7 @@ class Plan:
     lower: bool = False
     heads: frozenset[str] = frozenset()
     growing: frozenset[str] = frozenset()
+    doubled: frozenset[tuple[str, str]] = frozenset()
     with_status: bool = False
     in_codes: bool = False
     outlines: frozenset[Outline] = frozenset()
@@ -187,7 +191,10 @@ def _steps(lines: Sequence[Line], times: Times) -> Times:
     """Whether times that go back again and again are those since the line before, or durations and no times."""
     told = [line for line in lines if line.kind is Kind.OCTETS]
     stamps = [line.stamp for line in told if line.stamp is not None]
-    if not stamps or any(stamp.dated or stamp.daily for stamp in stamps):
+    clocks = sum(stamp.dated or stamp.daily for stamp in stamps)
+    if clocks:  # what others tell beside them is how long something took
+        return replace(times, clocks_only=True) if clocks < len(stamps) <= 2 * clocks else times
+    if not stamps:
         return times
     if len(stamps) < _NUMBERED * len(told):
         return replace(times, clocks_only=True)  # how long an answer took, beside answers
@@ -215,6 +222,8 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
         for family, count in many.items()
         if 2 * count >= written and (not family or family in ways or count > max(2, _MOSTLY * written))
     } | (multiple - {""})
+    keys = {key_of(family) for family in multiple} - {""}
+    trusted |= {family for family in many if key_of(family) in keys}
     with_octets = [line for line in with_octets if line.spelling != "one octet" or line.tool or line.family in trusted]
     if not with_octets:
         return None
@@ -228,7 +237,7 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
     best = max((name for name in amounts if name in directed), key=lambda name: amounts[name], default=None)
     if best is not None and 4 * amounts[best] >= amounts[main]:
         main = best
-    roles = _roles(with_octets, main, directed) | dict.fromkeys(_echoing(with_octets, main), Role.SAME)
+    roles = _roles(with_octets, main, directed) | dict.fromkeys(echoing(with_octets, main), Role.SAME)
     data = [line for line in with_octets if line.tool or line.bare or roles.get(line.family) is Role.DATA]
     told = sum(len(line.octets) for line in data)
     if not data or (told < 3 and not known and written > len(data)):
@@ -240,29 +249,16 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
         and 3 * len(data) < written
         and longest < _NO_WORD
         and not _are_headed(lines)
+        and not any(len(line.octets) >= SURELY and ends_with_crc16(line.octets) for line in data)
     ):
         return None  # a word here and there
     octetwise = 2 * sum(len(line.octets) == 1 for line in data) > len(data)
     return Plan(
         _name(data, lines), base, None, roles, main in directed, _width(data), octetwise,
         _bit_samples([line.samples for line in data if line.samples is not None]),
-        frozenset(line.spelling for line in data), growing=_growing(data),
+        frozenset(line.spelling for line in data), growing=growing(data), doubled=doubled(data),
         labelled=main != "", lower=2 * sum(line.lower for line in data) > len(data),
     )  # fmt: skip
-
-
-def _growing(data: Sequence[Line]) -> frozenset[str]:
-    """Labels whose lines are the begin of the next one again and again: a buffer, each time more came."""
-    grown, many = Counter[str](), Counter(line.family for line in data)
-    for line, after in pairwise(data):
-        alike = (line.family, line.way) == (after.family, after.way) and len(line.octets) > 1
-        grown[line.family] += alike and _goes_on(line.octets, after.octets)
-    return frozenset(name for name in many if grown[name] >= _FIXED_LEAST and grown[name] >= _GROWN * many[name])
-
-
-def _goes_on(octets: bytes, after: bytes) -> bool:
-    """Whether the octets that follow are the same with more behind."""
-    return len(after) > len(octets) and after.startswith(octets)
 
 
 def _are_headed(lines: Sequence[Line]) -> bool:
@@ -286,18 +282,26 @@ def _are_headed(lines: Sequence[Line]) -> bool:
 def _roles(lines: Sequence[Line], main: str, directed: set[str]) -> dict[str, Role | None]:
     """What lines with each label mean."""
     text = b"".join(line.octets for line in lines if line.family == main)
+    many_of = Counter(line.family for line in lines)
     usual = {line.spelling for line in lines if line.family == main}
     alike = {line.family for line in lines if line.spelling in usual}
     seen: dict[str, list[int]] = {}
     stretches = Counter(family for family, _ in groupby(line.family for line in lines))
+    key = key_of(main)
     at = 0
-    for line in lines:
+    for before, line in zip([None, *lines], lines, strict=False):
         if line.family == main:
             at += len(line.octets)
             continue
         count = seen.setdefault(line.family, [0, 0, 0])
         count[0] += 1
-        count[1] += line.octets in text[max(0, at - WINDOW) : at + WINDOW]
+        if many_of[line.family] < FEW:  # the begin of an answer that was cut is found in others, too
+            told = [before.octets] if before is not None else []
+            count[1] += any(
+                line.octets in one for one in (*told, *(one.octets[1:] for one in lines if one.family == main))
+            )
+        else:
+            count[1] += line.octets in text[max(0, at - WINDOW) : at + WINDOW]
         count[2] += len(line.octets)
     roles: dict[str, Role | None] = {main: Role.DATA}
     said = {line.way for line in lines if line.family == main}
@@ -311,34 +315,23 @@ def _roles(lines: Sequence[Line], main: str, directed: set[str]) -> dict[str, Ro
             and stretches[family] >= min(many, _FIXED_LEAST)  # between the others: a master asks the same for ever
         ):
             roles[family] = Role.SAME
-        elif family in directed or ((main not in directed or (one_way and octets > 4 * many)) and family in alike):
+        elif _by_another_sign(main, family, lines):
+            roles[family] = None
+        elif (
+            family in directed
+            or ((main not in directed or (one_way and octets > 4 * many)) and family in alike)
+            or (key and key_of(family) == key)
+        ):
             roles[family] = Role.DATA
         else:
             roles[family] = None
     return roles
 
 
-def _echoing(lines: Sequence[Line], main: str) -> set[str]:
-    """Labels whose lines nearly all repeat the line of another label before, at the same time: no answer comes as
-    soon."""
-    many, again = Counter[str](), Counter[str]()
-    for before, line in pairwise(lines):
-        many[line.family] += 1
-        is_other = before.family != line.family and line.spelling == before.spelling
-        again[line.family] += is_other and line.octets == before.octets and _are_at_once(before, line)
-    return {
-        name
-        for name, count in again.items()
-        if name not in (main, "") and count >= _FIXED_LEAST and count >= _MOSTLY * many[name]
-    }
-
-
-def _are_at_once(before: Line, line: Line) -> bool:
-    """Whether a line has the time of the one before, by a clock that would tell an answer from its request."""
-    told, stamp = before.stamp, line.stamp
-    if told is None or stamp is None or stamp.tick > MS:
-        return False
-    return abs(stamp.time - told.time) < FASTEST * len(line.octets)
+def _by_another_sign(main: str, family: str, lines: Sequence[Line]) -> bool:
+    """Whether lines have numbers that may be octets where a known tool writes its octets so that they are sure."""
+    is_sure = all(line.tool and not line.spelling.startswith(_NUMBERS) for line in lines if line.family == main)
+    return is_sure and all(line.spelling.startswith(_NUMBERS) for line in lines if line.family == family)
 
 
 def _width(data: Sequence[Line]) -> int | None:

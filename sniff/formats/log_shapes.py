@@ -24,6 +24,7 @@ class Role(Enum):
     SAME = "same"  # repeats octets that another line of the log tells
     HEADING = "heading"  # says time or direction of the octets below
     NOTHING = "nothing"  # belongs to the log, and tells no octets
+    PERHAPS = "perhaps"  # octets of which the whole log says whether another line tells them
     AGAIN = "again"  # what was told last comes again, with more behind
 
 
@@ -102,6 +103,8 @@ SHAPES: tuple[Shape, ...] = (
     _shape("sigrok", r"^(?:\d+-\d+\s+[\w /.-]+?|\w+-\d+): ?(?:.*: ?)?"
                      r"(?:[Ss]tart bit|[Ss]top bit|[Pp]arity|[01]$|Frame error|Break)",
            Role.NOTHING),
+    _shape("minimalmodbus", rf"^(?!.*MinimalModbus debug mode).*?\b(?P<way>The response) is: "
+                            rf"(?P<octets>b?'(?:[^'\\]|\\.)*'|b?\"(?:[^\"\\]|\\.)*\"|{_H2}(?: {_H2})*)", Role.PERHAPS),
     _shape("minimalmodbus", rf"MinimalModbus debug mode\. (?:(?P<way>Writing)|Response).*"
                             rf"['\"] \((?P<octets>{_H2}(?: {_H2})*)\)"),
     _shape("minimalmodbus", r"MinimalModbus debug mode\. (?:Will write|Writing|Response)"),
@@ -110,7 +113,7 @@ SHAPES: tuple[Shape, ...] = (
            Role.NOTHING),
     _shape("node-modbus-serial", r"\bdata: <Buffer (?P<octets>[0-9a-f ]+?)(?P<cut> \.\.\.[^>]*)?>"),
     _shape("node-modbus-serial", r"\bbuffer: <Buffer", Role.SAME),
-    _shape("node-modbus-serial", r"<Buffer (?P<octets>[0-9a-f ]+?)(?P<cut> \.\.\.[^>]*)?>"),
+    _shape("node-modbus-serial", r"<Buffer (?P<octets>[0-9a-f ]+?)(?P<cut> \.\.\.[^>]*)?>", Role.PERHAPS),
     _shape("node-modbus-serial", r"\"type\":\s*\"Buffer\",\s*\"data\":\s*(?P<octets>\[[\d,\s]+\])"),
     _shape("QModMaster", rf"\[(?:RTU|ASCII|TCP)\]>\s*(?P<way>[TR]x)\s*>\s*{_S}\s*-"),
     _shape("QModMaster", r"^Sys\s*>", Role.NOTHING),
@@ -122,6 +125,8 @@ SHAPES: tuple[Shape, ...] = (
     _shape("pymodbus", r"\bFrame - (?:\[.*\] )?not ready\b", Role.AGAIN),
     _shape("pymodbus", r"\b(?P<way>send|recv|SEND|RECV):\s+0x"),
     _shape("modbus_tk", r"(?P<way>->|<-)\s*\d{1,3}-\d{1,3}-\d{1,3}"),
+    _shape("mbusd", rf"\bconn\[[^\]]*\]: (?P<way>request): (?P<octets>(?:\[{_H2}\])+)", whole=_with_crc),
+    _shape("mbusd", rf"\bconn\[[^\]]*\]: (?P<way>response): (?P<octets>(?:\[{_H2}\])+)", Role.PERHAPS, _with_crc),
     _shape("jpnevulator", rf"^\s*{_S}: \S+$", Role.HEADING),
     _shape("Docklight", r"\[(?P<way>TX|RX|C1|C2)\]"),
     _shape("Docklight", r"^\s*Docklight", Role.NOTHING),
@@ -140,6 +145,9 @@ SHAPES: tuple[Shape, ...] = (
 """The first that is found in a line counts."""
 
 _OF_TSHARK = "the capture itself, or `tshark -x` of it"
+
+BUFFER = re.compile(r"\bProcessing:$")
+"""Labels of known tools (pymodbus) that tell what waits in a buffer: what came before, and what came to it."""
 
 DECODED = (
     (re.compile(r"<pdml[ >]"), "PDML, which has decoded fields and no octets as they were sent", _OF_TSHARK),
