@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum, auto
 from typing import NamedTuple
 
-from dissectors.frame import Damage, LineError, Mark, Place, Reason
+from dissectors.frame import Damage, LineError, Mark, Noise, Place, Reason
 from dissectors.modbus.candidates import SHORT_FRAME, LengthGuess, octet_bits, readings
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, MAX_UNIT
 from dissectors.modbus.lengths import MAX_FRAME, MIN_FRAME, MORE
@@ -107,6 +107,17 @@ def predicted(octets: bytes) -> int | None:
 def zeros_at_start(octets: bytes) -> int:
     """How many zeros a stretch begins with."""
     return len(octets) - len(octets.lstrip(b"\0"))
+
+
+def levels_at_start(octets: bytes | bytearray) -> int:
+    """How many octets of one level of the line (FF or 00) a stretch begins with: a driver that is switched on, or
+    stations that settle who answers, as some makers' searches have it."""
+    return len(octets) - len(octets.lstrip(octets[:1])) if octets[:1] in (b"\xff", b"\0") else 0
+
+
+def is_preamble(noise: Noise) -> bool:
+    """Whether octets FF stand before a frame."""
+    return noise.place is Place.BEFORE and not noise.octets.strip(b"\xff")
 
 
 def noise_reason(octets: bytes, marks: tuple[Mark, ...]) -> Reason:

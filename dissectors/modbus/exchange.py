@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from dissectors.findings import counted
 from dissectors.frame import Frame, Header, Role
-from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, ITEMS_ASKED, answer_length
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, ITEMS_ASKED, MAX_UNIT, answer_length
 from dissectors.modbus.learned_timing import READ, WRITE
 from dissectors.modbus.notation import CHECK, HEAD
 from dissectors.quick_values import quickly_made
@@ -116,7 +116,14 @@ class Exchange:
         """Whether unit and function (as an exception or not) of an answer are those asked."""
         if len(octets) < 2 or len(self.octets) < 2:
             return False
-        return (octets[0] == self.unit or self.asks_nobody) and octets[1] & ~EXCEPTION_BIT == self.octets[1]
+        from_there = octets[0] == self.unit or self.asks_nobody or self._asks_any
+        return from_there and octets[1] & ~EXCEPTION_BIT == self.octets[1]
+
+    @property
+    def _asks_any(self) -> bool:
+        """Whether it asks, by a maker's function, an address that the standard reserves: so some makers search, and
+        whoever it concerns answers, by its own address perhaps."""
+        return self.unit > MAX_UNIT and self.octets[1] & ~EXCEPTION_BIT not in FUNCTIONS
 
     @property
     def last_end(self) -> int:
@@ -166,6 +173,8 @@ class Exchange:
             error = why  # what it would mean in answer to something else says nothing here
         if error is None and self.asks_nobody:
             error = f"unit {answer.unit} answered a request to address 0"
+        if error is None and self._asks_any and answer.unit != self.unit:
+            error = f"unit {answer.unit} answered a request to whoever it concerns"
         if error is None and self.fault:
             error = damaged_request(self.fault)
         if error is None and self.garble:

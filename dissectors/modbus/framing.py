@@ -42,7 +42,7 @@ from dissectors.modbus.candidates import (
     readings,
     whole_stretch,
 )
-from dissectors.modbus.damaged import Side
+from dissectors.modbus.damaged import Side, levels_at_start
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, MAX_UNIT, is_open_length
 from dissectors.modbus.lengths import MAX_FRAME, MORE
 from dissectors.modbus.open_length import OpenLengthFinder, settled_end
@@ -355,6 +355,8 @@ class RtuFramer:
         starts = list(window.cuts)
         if window.start_bits() or window.good_before:
             starts.append(base)
+            if silent and (level := levels_at_start(octets)):
+                starts.append(base + level)
         known, good = bytes(octets[:count]), self._finder.good
         for each in self._open.look(known, base, starts, good, silent, window.expected, window.past, window.units):
             found[each.start, each.length] = each

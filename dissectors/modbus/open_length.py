@@ -33,6 +33,7 @@ _UNPREDICTED: Final = frozenset(range(256)) - {
 }
 """Function octets behind which a frame may begin whose length nothing predicts."""
 
+_SETTLING: Final = 0xFF
 _MOST_BEGINS: Final = 32
 _INITIAL: Final = 0xFFFF
 
@@ -135,13 +136,13 @@ class OpenLengthFinder:
                     bare = without_zeros(candidate.octets, past, partner[position])
                     candidate = candidate._replace(length=len(bare), octets=bare)
                 found[position, candidate.length] = candidate
-                end = candidate.end
-                answers = _same(known, position - base, end - base)
-                if end not in partner and _opens(known, end - base):
-                    ahead.add(end)
-                elif answers and not silent and end - base > len(known) - MIN_FRAME:
-                    self.unfinished.append(end)  # no more than its head is there
-                partner[end] = partner.get(end, False) or answers
+                for end in {candidate.end, base + _beyond(known, candidate.end - base)}:
+                    answers = _same(known, position - base, end - base)
+                    if end not in partner and _opens(known, end - base):
+                        ahead.add(end)
+                    elif answers and not silent and end - base > len(known) - MIN_FRAME:
+                        self.unfinished.append(end)  # no more than its head is there
+                    partner[end] = partner.get(end, False) or answers
         return list(found.values())
 
     def _frames(
@@ -200,7 +201,17 @@ def settled_end(known: bytes, at: int) -> int:
 
 def _is_agreed(known: bytes, at: int, after: int) -> bool:
     """Whether what stands at `after` says that the frame which begins at `at` ends there."""
-    return _same(known, at, after) or _begins_exchange(known, after)
+    if _same(known, at, after) or _begins_exchange(known, after):
+        return True
+    beyond = _beyond(known, after)
+    return beyond > after and _same(known, at, beyond)
+
+
+def _beyond(known: bytes, at: int) -> int:
+    """The index behind the octets FF at `at`: so some makers' stations settle who answers."""
+    while at < len(known) and known[at] == _SETTLING:
+        at += 1
+    return at
 
 
 def _begins_exchange(known: bytes, at: int) -> bool:

@@ -21,6 +21,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from dissectors.frame import Event, Header, Noise, Reason, Role
+from dissectors.modbus.damaged import is_preamble
 from dissectors.modbus.damaged_unit import names_another, unit_of
 from dissectors.modbus.doubts import is_full
 from dissectors.modbus.envelope import readable_adu
@@ -28,7 +29,7 @@ from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, ech
 from dissectors.modbus.exchanges import FIRST_SEEN
 from dissectors.modbus.functions import BROADCAST, ITEMS_ASKED
 from dissectors.modbus.pairing import another_function, is_listen_only, is_restart, mismatch
-from dissectors.modbus.promptness import AT_ONCE
+from dissectors.modbus.promptness import AT_ONCE, has_no_layout
 from dissectors.modbus.tracker_memory import TrackerMemory
 from dissectors.tracker import Placement, Tracked, Transaction, Verdict
 
@@ -278,7 +279,7 @@ class ModbusTracker(TrackerMemory):
         is_timed = self._timing.has_times and self._timing.latency < AT_ONCE  # else nothing comes too soon
         too_soon = is_timed and gap < self.learnt.too_soon(self._silence) and not self._may_be_next(gap, seen)
         if last is not None and last.octets == seen.octets and too_soon:
-            if last.answered and self._held.goes_on(seen):
+            if last.answered and (self._held.goes_on(seen) or (last.copied is None and has_no_layout(seen))):
                 return self._request(seen, sure=False)
             if last.answered:
                 self._held.twice = seen.no
@@ -315,7 +316,7 @@ class ModbusTracker(TrackerMemory):
         if self._echoes.is_cut(request, noise.octets, noise.start):
             request.echoed = True
             return
-        if request.garble or noise.reason in _QUIET_NOISE or len(noise.octets) < _GARBLE:
+        if request.garble or noise.reason in _QUIET_NOISE or len(noise.octets) < _GARBLE or is_preamble(noise):
             return
         if self.learnt.in_time(request.unit, request.pace, request.gap(noise.start)):
             many = len(noise.octets)

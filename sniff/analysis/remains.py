@@ -92,6 +92,14 @@ class Remains:
             how_often = f"{often} times" if self._tally.count <= len(rests) else f"in {often} of {len(rests)} compared"
             words = f"{finding.seen}; the same {counted(len(same), 'octet')} {how_often} ({same[:8].hex(' ').upper()}"
             finding = replace(finding, seen=words + (" …)" if len(same) > 8 else ")"))
+        if rests and not b"".join(rests).strip(b"\xff") and finding.subject == BUS:
+            return replace(
+                finding,
+                severity=min(finding.severity, Severity.NOTE),
+                means="a preamble: some makers' stations settle so who answers a search; or a driver that is switched "
+                "on long before its frame",
+                next="nothing, where the frames behind them are good",
+            )
         fit = self._other_protocol()
         if fit is not None:
             means = fit.means if fit.of_network else f"another protocol on the same line: {fit.means}"
