@@ -30,6 +30,7 @@ from dissectors.bacnet.values import (
     show_held,
     show_part,
 )
+from dissectors.findings import counted
 
 KNOWN_OBJECTS = 63
 """Object types from here on are later than the tables of property types, or a vendor's."""
@@ -73,6 +74,7 @@ class _Misfit(Exception):
         self.at = at
 
 
+_EMPTY = "empty"
 VALUE_ONLY = "= "
 
 
@@ -166,7 +168,9 @@ def decode(layout: str | None, octets: bytes, names: Outline | None = None) -> D
         entries, at, error = misfit.entries, misfit.at, str(misfit)
     rest = tree.tags[at:]
     if error is None and rest:
-        error = f"{len(rest)} tags more than the service has"
+        error = f"{counted(len(rest), 'tag')} more than the service has"
+    if tree.error is not None:  # what is not there was cut off
+        wrong = [one for one in wrong if one.found != _EMPTY]
     return Decoded(ConstructedValue(None, entries), rest, tree.error or error, tuple(wrong))
 
 
@@ -180,13 +184,22 @@ def _sequence(
             if not _fits(field, tags, at):
                 if field.optional:
                     continue
-                raise _Misfit(f"{field.name} is missing")
+                raise _Misfit(f"{field.name} is missing{_instead(tags, at)}")
             value, at = _field(field, tags, at, scope, depth)
         except _Misfit as misfit:
             raise _Misfit(str(misfit), entries, start) from None
         scope.note(field, value)
         entries.append((field.name, value))
     return entries, at
+
+
+def _instead(tags: Sequence[Tag], at: int) -> str:
+    """What stands in the place of something that is missing."""
+    if at >= len(tags):
+        return ""
+    tag = tags[at]
+    known = not tag.context and tag.number < len(APPLICATION)
+    return f", {APPLICATION[tag.number] if known else f'tag [{tag.number}]'} stands there"
 
 
 def _fits(field: LayoutField, tags: Sequence[Tag], at: int) -> bool:
@@ -332,17 +345,23 @@ def _any(tags: Sequence[Tag], scope: _Scope, depth: int) -> Any:
 
 
 def _note_type(expected: str, tags: Sequence[Tag], scope: _Scope) -> None:
-    """Keep that a value is of another type, where that is sure: one primitive value in place of another kind of one.
+    """Keep that a value is of another type, where that is sure: one value or none in place of a primitive one.
 
     Null is no value: written, it gives a commanded property up.
     """
     kind, about = base(expected), scope.object
-    if kind is None or about is None or about.type >= KNOWN_OBJECTS or scope.property is None or len(tags) != 1:
+    if kind is None or about is None or about.type >= KNOWN_OBJECTS or scope.property is None or len(tags) > 1:
+        return
+    if not tags:
+        scope.wrong.append(WrongType(about, scope.property, kind, _EMPTY))
         return
     (tag,) = tags
-    if tag.context or tag.number == NUMBER_OF["Null"] or not tag.number < len(APPLICATION):
+    if tag.context:
+        found = f"in a context tag {tag.number}"
+    elif tag.number == NUMBER_OF["Null"] or not tag.number < len(APPLICATION):
         return
-    found = APPLICATION[tag.number]
+    else:
+        found = APPLICATION[tag.number]
     if found == kind:  # the right type, but no such value
         found = f"{found} of {len(tag.octets)} octets"
     scope.wrong.append(WrongType(about, scope.property, kind, found))

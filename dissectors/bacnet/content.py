@@ -1,4 +1,5 @@
-"""Oddities in the content of good frames: reply bits, dates that are none, values of another type. Pure, total.
+"""Oddities in the content of good frames: reply bits, dates that are none, values of another type, parameters that do
+not fit their service. Pure, total.
 
 Whether a reply is expected is said twice: by the frame type (5, 32: the receiver answers at once; ANSI/ASHRAE 135, 9.3)
 and by bit 2 of the network header (6.2.2, which a router makes the frame type from). A confirmed request has both
@@ -56,6 +57,7 @@ class Odd(Enum):
     REPLY = "reply"
     DATE = "date"
     TYPE = "type"
+    FORM = "form"
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,20 +107,35 @@ def oddities(frame: Frame) -> tuple[Oddity, ...]:
 
 _SAYS_NEITHER = frozenset(
     {(PduType.CONFIRMED_REQUEST, 12), (PduType.CONFIRMED_REQUEST, 14)}
-    | {(PduType.UNCONFIRMED_REQUEST, service) for service in (0, 1, 7, 8)}
     | {(PduType.SIMPLE_ACK, service) for service in range(64)}
 )
-"""Messages that hold no date and no value: reads, I-Am, I-Have, Who-Has, Who-Is."""
+"""Messages that are not looked into: reads are most of all, and hold no date and no value."""
 
 
 @lru_cache(maxsize=1024)
 def _in_parameters(pdu_type: int, service: int, parameters: bytes) -> tuple[Oddity, ...]:
-    decoded = codec.decode(services.parameters(pdu_type, service), parameters)
+    layout = services.parameters(pdu_type, service)
+    decoded = codec.decode(layout, parameters)
     found = [Oddity(Odd.TYPE, str(wrong)) for wrong in decoded.wrong]
+    if layout is not None and decoded.error is not None:
+        what = f"{services.service_name(pdu_type, service)} {_PDU_WORDS.get(pdu_type, '')}".strip()
+        found.append(Oddity(Odd.FORM, f"{what}: {_misfit(pdu_type, decoded)}"))
     found += [Oddity(Odd.DATE, str(when)) for when in _whens(decoded.record, 0) if when.flaw is not None]
     for tag in decoded.rest:
         found += [Oddity(Odd.DATE, str(when)) for when in _whens(tag, 0) if when.flaw is not None]
     return tuple(dict.fromkeys(found))
+
+
+_PDU_WORDS = {PduType.COMPLEX_ACK: "answer", PduType.ERROR: "error"}
+
+
+def _misfit(pdu_type: int, decoded: codec.Decoded) -> str:
+    """Why parameters do not fit, as one would say it to who wrote the sender."""
+    inner = decoded.rest[0].children if len(decoded.rest) == 1 else None
+    if pdu_type == PduType.ERROR and not len(tuple(decoded.record)) and inner is not None and len(inner) == 2:
+        return f"class and code stand between tags {decoded.rest[0].number} that do not belong there"
+    assert decoded.error is not None
+    return decoded.error
 
 
 def _whens(value: Any, depth: int) -> Iterator[Date | Time]:

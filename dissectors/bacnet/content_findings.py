@@ -43,14 +43,24 @@ CONTENT_RULES = (
         "MS703",
         Severity.NOTE,
         "value of another type",
-        "The value of a standard property of a standard object has another primitive type than the standard gives it "
-        "(ASHRAE 135, clause 12). Null is not judged: written, it gives a property up.",
+        "The value of a standard property of a standard object has another primitive type than the standard gives it, "
+        "a context tag, or is not there (ASHRAE 135, clause 12). Null is not judged: written, it gives a property up.",
         "an error in the sender's data or a gateway's mapping; strict clients refuse it, others show it wrong",
         "the object named, in the sender's configuration",
     ),
+    Rule(
+        "MS704",
+        Severity.NOTE,
+        "parameters that do not fit",
+        "The parameters of a standard service, of an answer or an error to it are cut short, lack what must be there, "
+        "hold more than belongs there, or have other tags than the standard gives them (ASHRAE 135, 20.2 and 21). "
+        "What is read is not judged.",
+        "an error in the sending station's software; strict programs drop or refuse such a message, others misread it",
+        "the firmware of the sender; behind a router, that of the station named",
+    ),
 )
 
-_CODES = {Odd.REPLY: "MS701", Odd.DATE: "MS702", Odd.TYPE: "MS703"}
+_CODES = {Odd.REPLY: "MS701", Odd.DATE: "MS702", Odd.TYPE: "MS703", Odd.FORM: "MS704"}
 _RULES = {rule.code: rule for rule in CONTENT_RULES}
 
 SENDERS_KEPT = 512

@@ -193,6 +193,10 @@ def _instance(data: bytes, at: int) -> int | None:
     return None
 
 
+_ENUMERATES = frozenset(((False, 9), (False, 2), (True, 0), (True, 1)))
+"""Tags under which class and code are sent, the right one first: whether it is a context tag, and its number."""
+
+
 def error_text(data: bytes, at: int) -> str:
     """Class and code of an Error-PDU whose parameters begin at `at`: "object unknown-object"."""
     if at < len(data) and data[at] == 0x0E:
@@ -202,7 +206,7 @@ def error_text(data: bytes, at: int) -> str:
     words = []
     for enumeration in ("ErrorClass", "ErrorCode"):
         tag = tagging.header_at(data, at)
-        if isinstance(tag, str) or tag.context or tag.number != 9 or not 1 <= tag.end - tag.begin <= 8:
+        if isinstance(tag, str) or (tag.context, tag.number) not in _ENUMERATES or not 1 <= tag.end - tag.begin <= 8:
             return "error without class and code"
         words.append(names.name(enumeration, int.from_bytes(data[tag.begin : tag.end], "big")))
         at = tag.end

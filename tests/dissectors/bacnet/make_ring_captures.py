@@ -19,7 +19,7 @@ _OBJECT = "c400800000"
 SEGMENTS = (f"01043c0100010c0c02000005194c3e{_OBJECT * 6}", f"0104380101010c{_OBJECT * 4}3f")
 """A list of objects in two segments."""
 
-I_AM = "01001000c4020000c82201e09100225d"
+I_AM = "01001000c4020000c82201e09100215d"
 _HEAD = "#!sniff-capture 1\n# line: 38400,8N1\n# protocol: mstp\n# start: 2026-03-01T10:00:00Z\n"
 
 
@@ -167,7 +167,7 @@ def one_hog() -> list[Step]:
     """2 sends ten frames with each token."""
     steps: list[Step] = []
     for _ in range(75):
-        many = [(2.0, data(2, 14, "0100100a" + "5a" * 40)) for _ in range(10)]
+        many = [(2.0, data(2, 14, "0100100409631901" + "2e6520" + "5a" * 32 + "2f")) for _ in range(10)]
         steps += [*many, (2, token(2, 14)), (2, token(14, 2))]
     return steps
 
@@ -275,6 +275,14 @@ def taken_for_anothers() -> list[Step]:
     return steps + rounds(3, 3, 12, 19)
 
 
+def misfits() -> list[Step]:
+    """31 sends class and code of errors between tags, as Unsigned, and answers that are cut short."""
+    steps: list[Step] = []
+    for answer in ("50010c0e910291200f", "50010c21029120", VALUE[4:-4], "50010c0e910291200f"):
+        steps += [*rounds(2, 12, 31), (2, data(12, 31, READ, expects=True)), (9, data(31, 12, "0100" + answer))]
+    return steps + rounds(2, 12, 31)
+
+
 def token_to_itself() -> list[Step]:
     """3 believes to be alone, and passes the token to itself; the adapter hides how soon."""
     return [(4 + at % 3 * 9, token(3, 3)) for at in range(60)]
@@ -308,6 +316,7 @@ MADE = {
     "ms-tp-last-two-octets-missing": last_two_octets_missing,
     "ms-tp-answers-what-others-are-asked": answers_for_others,
     "ms-tp-answers-in-place-of-another": taken_for_anothers,
+    "ms-tp-parameters-that-do-not-fit": misfits,
     "ms-tp-token-to-itself-behind-an-adapter": token_to_itself,
 }
 
