@@ -126,7 +126,7 @@ def _in_parameters(pdu_type: int, service: int, parameters: bytes) -> tuple[Oddi
     return tuple(dict.fromkeys(found))
 
 
-_PDU_WORDS = {PduType.COMPLEX_ACK: "answer", PduType.ERROR: "error"}
+_PDU_WORDS: dict[int, str] = {PduType.COMPLEX_ACK: "answer", PduType.ERROR: "error"}
 
 
 def _misfit(pdu_type: int, decoded: codec.Decoded) -> str:
