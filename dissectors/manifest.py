@@ -86,6 +86,8 @@ class Dissector:
     dot where none are given.
     `noun`: what its people call a place on the bus. `family`: under which name device profiles speak of it.
     `bits(frame)`: how much a good frame speaks for this protocol: log2 of how seldom random octets hold one like it.
+    `neighbour(octets)`: another protocol with frames of the same form, where octets together tell that they are of it;
+    "" where they may be of this one.
     `sieve(octets)`: False where octets that stand alone hold no good frame, whatever their times; told in a few µs.
     `judge`: makes the rules at work on a bus; `rules`: their catalogue, by code.
     `ring`: how its token ring is watched and shown, if it passes a token.
@@ -124,6 +126,7 @@ class Dissector:
     noun: str = "station"
     family: str = ""
     bits: Callable[[Frame], float] = lambda frame: RARE_BITS
+    neighbour: Callable[[bytes], str] = lambda octets: ""
     sieve: Callable[[bytes], bool] = lambda octets: True
     judge: Callable[[Timing], Judge] | None = None
     rules: Mapping[str, Rule] = field(default_factory=dict)

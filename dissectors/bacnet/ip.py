@@ -144,8 +144,8 @@ def ip_asks(frame: Frame) -> tuple[Reading, ...]:
 
 
 def ip_bits(frame: Frame) -> float:
-    """Evidence of a whole frame: type, function and length of a datagram."""
-    return 24.0 if frame.ok else 0.0
+    """Evidence of a whole frame: type, function and length of a datagram, which does not begin behind something."""
+    return 24.0 if frame.ok and not frame.skipped else 0.0
 
 
 def ip_packet(frame: Frame, role: Role) -> Any:

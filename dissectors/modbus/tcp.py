@@ -101,8 +101,9 @@ def tcp_spans(frame: Frame, readings: Sequence[Reading]) -> list[Span | None]:
 
 
 def tcp_bits(frame: Frame) -> float:
-    """Evidence of a whole frame: two octets of protocol, the upper one of a length, and that it ends where it says."""
-    return 24.0 if frame.ok else 0.0
+    """Evidence of a whole frame: two octets of protocol, the upper one of a length, and that it ends where it says.
+    Behind octets that are none it is no evidence: other protocols have zeros as well, and here nothing is checked."""
+    return 24.0 if frame.ok and not frame.skipped else 0.0
 
 
 def tcp_types() -> FieldTypes:

@@ -22,6 +22,7 @@ kernel = on_first_use("dissectors.profibus.kernel:kernel")
 judge = on_first_use("dissectors.profibus.judging_columns:BulkProfibusFindings")
 watch = on_first_use("dissectors.profibus.bulk_watch:BulkBusWatch")
 pairing = on_first_use("dissectors.profibus.block_pairing:pairing")
+neighbour = on_first_use("dissectors.profibus.neighbours:neighbour")
 
 _EVIDENCE = {1: 2.0, 3: 8.0, 6: 22.0}
 """Bits of evidence by length: short acknowledgement and token have no check, and are believed only in their place."""
@@ -61,6 +62,7 @@ PROFIBUS = Dissector(
     field_prefixes=("pb.",),
     field_types=on_first_use("dissectors.profibus.field_types:types"),
     bits=bits,
+    neighbour=neighbour,
     sieve=sieve,
     judge=judge,
     rules=RULES,

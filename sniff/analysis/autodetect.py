@@ -45,6 +45,9 @@ REJECT_ROWS = 0.7
 MARKED_MOST = 0.15
 COVERED_LEAST = 0.6
 
+HEARD_MOST = 4096
+"""Octets that are asked whether they are of a protocol that only has frames of the same form."""
+
 _FRAME_MOST = 24.0
 _NOISE_BITS = 0.25  # against, an octet
 _MARK_BITS = 1.0
@@ -122,6 +125,7 @@ class CandidateEvidence:
         self.marked = 0
         self.rows = 0
         self.first: int | None = None
+        self._heard = bytearray()
         self._even_marked = self._odd_marked = self._even = self._odd = 0
         self._high = 0
 
@@ -130,6 +134,7 @@ class CandidateEvidence:
         if chunk.octets:
             self.first = chunk.time if self.first is None else self.first
             self._count(chunk)
+            self._heard += chunk.octets[: HEARD_MOST - len(self._heard)]
         for name, engine in self.engines.items():
             self._take(name, engine.feed(chunk))
 
@@ -141,8 +146,10 @@ class CandidateEvidence:
                 self._take(name, engine.advance(now))
 
     def best(self) -> Candidature:
-        """The reading with the most evidence."""
-        name, tally = max(self.tallies.items(), key=lambda pair: (pair[1].bits, pair[1].octets))
+        """The reading with the most evidence; none is that of a protocol whose neighbour this is."""
+        ranked = sorted(self.tallies.items(), key=lambda pair: (pair[1].bits, pair[1].octets), reverse=True)
+        own = ((name, tally) for name, tally in ranked if not tally.frames or not self._neighbour(name))
+        name, tally = next(own, (ranked[0][0], Tally()))
         against = _NOISE_BITS * max(0, self.octets - tally.octets) + _MARK_BITS * self.marked
         return Candidature(
             self.line,
@@ -153,6 +160,9 @@ class CandidateEvidence:
             tally.octets / self.octets if self.octets else 0.0,
             self.marked / self.octets if self.octets else 0.0,
         )
+
+    def _neighbour(self, name: str) -> str:
+        return registry.get(name).neighbour(bytes(self._heard))
 
     @property
     def wrong(self) -> bool:
@@ -192,10 +202,10 @@ class CandidateEvidence:
     def _take(self, name: str, output: Output) -> None:
         tally = self.tallies[name]
         for row in output.rows:
-            if isinstance(row.event, Frame) and row.event.ok:
+            if isinstance(row.event, Frame) and row.event.ok and (bits := bits_of(row.event)) > 0:
                 tally.frames += 1
                 tally.octets += len(row.event.octets)
-                tally.bits += bits_of(row.event)
+                tally.bits += bits
         tally.bits += _ANSWERED_BITS * sum(one.verdict is Verdict.ANSWERED for one in output.transactions)
 
     def _count(self, chunk: Chunk) -> None:

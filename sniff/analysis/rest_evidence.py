@@ -44,7 +44,7 @@ def second_in(
             evidence.feed(chunk)
         evidence.advance(rest[-1].time + LATER)
         tally = evidence.tallies[name]
-        if tally.frames >= SECOND_FRAMES and tally.bits >= enough:
+        if tally.frames >= SECOND_FRAMES and tally.bits >= enough and not dissector.neighbour(b"".join(octets)):
             found.append((tally.bits, name, tally.frames))
     return max(found)[1:] if found else None
 

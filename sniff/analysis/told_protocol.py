@@ -27,6 +27,7 @@ from sniff.analysis.autodetect import (
     COVERED_LEAST,
     FOUND_BITS,
     FOUND_FRAMES,
+    HEARD_MOST,
     CandidateEvidence,
     Candidature,
     sureness,
@@ -55,17 +56,20 @@ class Sureness(Enum):
 @dataclass(frozen=True, slots=True)
 class Told:
     """What octets say. `reading`: the best protocol, None where none makes a good frame; `second`: another protocol
-    that explains what it does not, and how many good frames that has.
+    that explains what it does not, and how many good frames that has; `neighbour`: what they are instead.
     """
 
     sureness: Sureness
     reading: Candidature | None = None
     second: tuple[str, int] | None = None
+    neighbour: str = ""
 
     @property
     def words(self) -> str:
         """For people: the protocol, how sure, and why."""
         reading = self.reading
+        if self.neighbour:
+            return f"its octets are of {self.neighbour}, which is not known here"
         if reading is None:
             return "no protocol makes good frames of its octets"
         frames = "1 good frame holds" if reading.frames == 1 else f"{reading.frames} good frames hold"
@@ -109,10 +113,17 @@ def told_by(session: Session, only: str | None = None) -> Told:
         readings += [one for one in _readings(session, registry.relatives()) if one.covered > covered]
     readings.sort(key=lambda one: (one.bits, one.octets * one.covered), reverse=True)
     best = next((one for one in readings if one.frames), None)
-    if best is None:
-        return Told(Sureness.NO, None)
-    second = _second(session, best, [one.protocol for one in readings if one is not best and one.frames])
-    return Told(_how_sure(best, readings, second), best, second)
+    told = Told(Sureness.NO)
+    if best is not None:
+        second = _second(session, best, [one.protocol for one in readings if one is not best and one.frames])
+        told = Told(_how_sure(best, readings, second), best, second)
+    return replace(told, neighbour=_neighbour(session)) if told.sureness is Sureness.NO else told
+
+
+def _neighbour(session: Session) -> str:
+    """What octets of no protocol are of, where one of them has frames of the same form."""
+    octets = b"".join(chunk.octets for chunk in session.sample)[:HEARD_MOST]
+    return next((said for one in registry.usable() if (said := one.neighbour(octets))), "")
 
 
 def _readings(session: Session, protocols: Sequence[Dissector]) -> list[Candidature]:

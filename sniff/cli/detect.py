@@ -78,7 +78,7 @@ def _of_session(args: argparse.Namespace, session: Session) -> tuple[Outcome, st
     octets = sum(len(chunk.octets) for chunk in session.sample)
     reading = told.reading
     if reading is None or told.sureness is Sureness.NO:
-        return Outcome(Ending.UNKNOWN if octets else Ending.SILENT, None, 1, octets), ""
+        return Outcome(Ending.UNKNOWN if octets else Ending.SILENT, None, 1, octets), told.neighbour and told.words
     cannot: tuple[str, ...] = ()
     line = session.line
     if session.line_is_assumed and reading.protocol not in registry.RELATIVES:
@@ -99,7 +99,7 @@ def _of_session(args: argparse.Namespace, session: Session) -> tuple[Outcome, st
 def write(port: str, outcome: Outcome, also: str = "", opened: str = "") -> None:
     """Print for people. `opened`: of a file, by which command it is looked at."""
     if opened and outcome.reading is None:
-        print(f"{sanitized(port)}: {_of_no_protocol(outcome)}")
+        print(f"{sanitized(port)}: {also or _of_no_protocol(outcome)}")
         return
     print(f"{sanitized(port)}: {sentence(outcome)}")
     reading = outcome.reading
