@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from dissectors.bacnet.frame_types import HEADER
 from dissectors.bacnet.limits import N_POLL, T_NO_TOKEN, T_REPLY_DELAY, T_REPLY_TIMEOUT, T_USAGE_DELAY
 from dissectors.bacnet.ring import Ring, RingNode
 from dissectors.bacnet.ring_events import RingEventKind
@@ -43,7 +44,7 @@ def polls(ring: Ring) -> Iterable[Remark]:
         yield whole
     for mac, node in ring.nodes.items():
         seen, tokens, made = [], node.tokens_received, _polls_made(node)
-        if _polls_too_often(node):
+        if _polls_too_often(ring, node):
             seen.append(
                 f"{made} polls to {tokens} tokens (one in {N_POLL} is usual), {min(made, node.polls_unanswered)} "
                 "of them "
@@ -76,14 +77,15 @@ def _polls_made(node: RingNode) -> int:
     return node.polls_sent - node.polls_of_search
 
 
-def _polls_too_often(node: RingNode) -> bool:
+def _polls_too_often(ring: Ring, node: RingNode) -> bool:
     tokens, made = node.tokens_received, _polls_made(node)
-    return made >= LEAST_POLLS and tokens > 0 and made > POLLS_SHARE * tokens
+    unread = ring.header_errors + ring.cut + ring.noise // HEADER  # each of them may have been a token to it
+    return made >= LEAST_POLLS and tokens > 0 and made > POLLS_SHARE * (tokens + unread)
 
 
 def _who_poll_alike(ring: Ring) -> frozenset[int]:
     """Masters that poll too often, where they are several, and half of all: one setting or make, told once."""
-    often = frozenset(mac for mac, node in ring.nodes.items() if _polls_too_often(node))
+    often = frozenset(mac for mac, node in ring.nodes.items() if _polls_too_often(ring, node))
     return often if len(often) > 1 and 2 * len(often) >= len(ring.masters) else frozenset()
 
 

@@ -53,7 +53,7 @@ _ALL = (
         "other one went on too. At least twice, and only where tokens are in the capture.",
         "a second token after a disturbance, two stations with one address, or a ring joined while running",
         "the stations named: address switches, and whether two segments were joined",
-        explains=("MS401", "MS402", "MS403", "LN101", "LN103", "LN2"),
+        explains=("MS401", "MS402", "MS403", "LN101", "LN103", "LN2", "LN303"),
     ),
     Rule(
         "MS105",
@@ -141,9 +141,10 @@ _ALL = (
         "too many polls for masters",
         "A station polls for a new master once in 50 tokens (Npoll); more than one in 10 is counted here, "
         "with the share of time that unanswered polls take. Polls of a search for a successor, the first one or a lost "
-        "one, do not count. Where half of all masters do so, and two at least, it is one finding about the bus, and "
-        "theirs are noted under it. But searches after a loss that stopped the bus for over a second are said, with "
-        "their cost, and so are polls of many addresses with one token where nobody was lost.",
+        "one, do not count; what is no good frame may have been a token, and counts as one. Where half of all masters "
+        "do so, and two at least, it is one finding about the bus, and theirs are noted under it. But searches after a "
+        "loss that stopped the bus for over a second are said, with their cost, and so are polls of many addresses "
+        "with one token where nobody was lost.",
         "a station that does not count to Npoll, or polls far beyond the last address",
         "Max_Master and firmware of the stations named; gaps in the addresses",
     ),
@@ -348,7 +349,7 @@ _ALL = (
         "and repeats prove no second station.",
         "two stations with the same MS/TP address: both answer and both use the token",
         "switch one of the suspects off and see whether the address stays alive",
-        explains=("MS1", "MS2", "MS3", "MS4", "LN101", "LN103", "LN2"),
+        explains=("MS1", "MS2", "MS3", "MS4", "LN101", "LN103", "LN2", "LN303"),
     ),
     Rule(
         "MS601",

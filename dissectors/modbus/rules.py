@@ -12,7 +12,7 @@ _OF_LINE = ("LN101", "LN103", "LN201", "LN202", "LN203", "LN204")
 
 _OF_COLLISIONS = (
     *("MB005", "MB007", "MB008", "MB009", "MB010", "MB103", "MB104", "MB106", "MB107", "MB207", "MB208"),
-    *_OF_LINE,
+    *(*_OF_LINE, "LN303"),
 )
 """What two senders at once make of good frames."""
 
@@ -135,7 +135,7 @@ _ALL = (
         "the order of one master whose timeout is too short.",
         "two masters on one bus, or a commissioning tool left connected",
         "find the second master; a bus has one, use a gateway or multiplexer for more",
-        explains=(*_OF_COLLISIONS, "MB020", "MB002", "MB003", "MB201", "MB202", "MB302", "LN205", "LN303"),
+        explains=(*_OF_COLLISIONS, "MB020", "MB002", "MB003", "MB201", "MB202", "MB302", "LN205", "LN302"),
     ),
     Rule(
         "MB204",

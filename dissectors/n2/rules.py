@@ -86,7 +86,7 @@ RULES: dict[str, Rule] = {
             "find the second master and take it off",
             explains=(
                 *("N2004", "N2005", "N2008", "N2010", "N2011", "N2013", "N2014", "N2015", "N2016", "N2017"),
-                *("LN1", "LN2", "LN303"),
+                *("LN1", "LN2", "LN302", "LN303"),
             ),
         ),
         Rule(
@@ -98,7 +98,7 @@ RULES: dict[str, Rule] = {
             "that is late as often, whose answers they may be. A single time it is only noted.",
             "two stations have the same address",
             "switch the station off and see whether something still answers",
-            explains=("N2004", "N2011", "N2013", "N2014", "N2016", "LN101", "LN103", "LN2"),
+            explains=("N2004", "N2011", "N2013", "N2014", "N2016", "LN101", "LN103", "LN2", "LN303"),
         ),
         Rule(
             "N2009",

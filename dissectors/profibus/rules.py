@@ -112,7 +112,7 @@ RULES: dict[str, Rule] = {
             "in 100 requests on.",
             "two stations have the same address",
             "switch the station off and see whether something still answers",
-            explains=("PB002", "PB003", "PB007", "PB008", *_LINE),
+            explains=("PB002", "PB003", "PB007", "PB008", *_LINE, "LN303"),
         ),
         Rule(
             "PB011",
@@ -163,7 +163,7 @@ RULES: dict[str, Rule] = {
             "master sends.",
             "two masters that do not see each other, one with other bus parameters, or a master's address twice",
             "the bus parameters and addresses of all masters; take off the one that was added last",
-            explains=("PB002", "PB003", "PB007", "PB008", "PB013", "PB014", *_LINE),
+            explains=("PB002", "PB003", "PB007", "PB008", "PB013", "PB014", *_LINE, "LN302", "LN303"),
         ),
         Rule(
             "PB016",
