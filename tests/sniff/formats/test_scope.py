@@ -12,9 +12,10 @@ from dissectors.checksums import crc16_modbus
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.engine.capture import Capture, CaptureError
-from sniff.formats import read
+from sniff.formats import read, scope
 
 RATE, STEP = 9600, 1e-5  # Bd, s
+PAUSE = 0.006  # s; longer than the silence that ends a frame, and no longer: each sample is a row
 LINE = LineSettings.parse("9600,8E1")
 
 
@@ -43,7 +44,7 @@ def _levels() -> list[float]:
         for octet in frame:
             for bit in (0, *((octet >> at) & 1 for at in range(8)), octet.bit_count() & 1, 1):
                 hold(bit, 1 / RATE)
-        hold(0.5, 0.02)
+        hold(0.5, PAUSE)
     return levels
 
 
@@ -110,9 +111,18 @@ def test_the_octets_are_found(name: str, tmp_path: Path) -> None:
     assert capture.completeness().whole
 
 
+def test_rows_are_read_on_where_as_many_as_are_taken_at_once_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = _written(tmp_path, "Rigol")
+    whole = list(read(path).items())
+    monkeypatch.setattr(scope, "AT_ONCE", 1000)
+    assert list(read(path).items()) == whole
+
+
 def test_times_are_those_of_the_samples(tmp_path: Path) -> None:
     times = [item.time for item in read(_written(tmp_path, "Keysight")).items() if isinstance(item, Chunk)]
-    assert abs((times[8] - times[7]) - (0.021 + 11 / RATE) * 1e9) < 3 * STEP * 1e9
+    assert abs((times[8] - times[7]) - (PAUSE + 0.001 + 11 / RATE) * 1e9) < 3 * STEP * 1e9
 
 
 @pytest.mark.parametrize("odd", ["", "trigger", "1e999,nan", "nan,1", "-0.1", "x" * 10_000])
