@@ -46,6 +46,8 @@ class Echoes:
         if self._timing.latency >= AT_ONCE and (self.usual is False or (self.usual is None and _has_copies(newest))):
             return False  # no times tell, but others do; or there are more copies than one echo makes
         gap = newest.gap(seen.frame.start)
+        if newest.echoed and gap >= self.limit:
+            return False  # it came back already; who sends again so soon has a short timer
         if self._learnt.timeout is not None:
             return gap < self.limit or gap * 8 < self._learnt.timeout
         return gap < self.limit or (gap < AT_ONCE and newest.unit != BROADCAST)

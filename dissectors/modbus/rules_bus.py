@@ -11,6 +11,7 @@ from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.damage_shares import DamageShare, shares_of_damage, to_blame
 from dissectors.modbus.finding_words import note_if, of_few, request_words, units
+from dissectors.modbus.functions import BROADCAST, MAX_UNIT
 from dissectors.modbus.odd_ends import OddEnd
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.rules_late import of_impatience, of_late_speakers, under_late_answers
@@ -101,7 +102,9 @@ def _of_bus(seen: BusRecord, is_blamed: bool, scanned: list[int], unheard: list[
             words = f"{tally.count} requests to station {asked} answered by station {answered}"
             repeated = seen.repeated_elsewhere[asked]
             words += f"; the master asked again {times(repeated)}" if repeated else "; the master never asked again"
-            yield tally.found(RULES["MB206"], f"station {asked}", words, note_if(not repeated))
+            elsewhere = tally.found(RULES["MB206"], f"station {asked}", words, note_if(not repeated))
+            to_any = f"{asked} is this maker's address for whoever is there; or {RULES['MB206'].means}"
+            yield replace(elsewhere, means=to_any) if asked > MAX_UNIT else elsewhere
     unasked = seen.unasked
     if unasked.count:
         words = f"{unasked.count} of {counted(seen.answers, 'answer')} came unasked"
@@ -158,15 +161,22 @@ def _of_requests(seen: BusRecord) -> Iterator[Finding]:
         following = RULES["MB017"].next
         if seen.for_nobody:
             words += f"; {units(seen.for_nobody)} answered {times(sum(seen.for_nobody.values()))}"
-        if len(seen.for_nobody) == 1:
+        found_here = nobody.found(RULES["MB017"], "master", words)
+        if BROADCAST in seen.for_nobody:
+            means = "a device whose address is 0, as some are delivered, or that takes 0 for whoever is there"
+            found_here = replace(found_here, means=f"{found_here.means}; or {means}")
+            following = "give the device an address of 1 … 247, and set that in the master"
+        elif len(seen.for_nobody) == 1:
             following = f"set the unit number in the master to {next(iter(seen.for_nobody))}"
-        yield replace(nobody.found(RULES["MB017"], "master", words), next=following)
+        yield replace(found_here, next=following)
     cut = seen.cut_echoes
     if cut.count >= _CUT_LEAST and 2 * cut.count >= seen.requests:
         words = f"{cut.count} of {counted(seen.requests, 'request')} came back at once, and not whole"
         yield cut.found(RULES["MB013"], "bus", words)
     echoed = {unit: s.echoed for unit, s in seen.stations.items() if s.asked >= 3}
-    copying = [unit for unit, count in echoed.items() if 10 * count >= 9 * seen.stations[unit].asked]
+    asked = {unit: seen.stations[unit].asked for unit in echoed}
+    answering = [unit for unit in echoed if seen.stations[unit].answered]  # nobody is there to give anything back else
+    copying = [unit for unit in answering if 9 * asked[unit] <= 10 * echoed[unit] <= 10 * asked[unit]]
     if len(copying) == 1 and len(echoed) > 1 and sum(echoed.values()) == echoed[copying[0]]:
         station = seen.stations[copying[0]]
         words = f"{station.echoed} of {counted(station.asked, 'request')} came back from it before its answer"

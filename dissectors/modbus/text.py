@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 _MOST_REGISTERS = 10
 _MOST_BITS = 32
 _MOST_OCTETS = 16
+_EXCEPTION = 3
+"""Unit, function and code."""
+
 _ARROWS = {Role.RESPONSE: "→", Role.REQUEST: "←", Role.BROADCAST: "←"}
 
 
@@ -76,6 +79,8 @@ def printable(octets: bytes) -> str:
 def _words(octets: bytes, code: int, role: Role) -> str:
     if code in NO_EXCEPTIONS:
         return _with(f"function 0x{code:02X}", _hex(octets[2:]))
+    if code & EXCEPTION_BIT and len(octets) > _EXCEPTION:
+        return f"exception of {len(octets) - 2} octets where it has 1: {_hex(octets[2:])} ({_asked(code)})"
     if code & EXCEPTION_BIT:
         name = exception_name(octets[2]) if len(octets) > 2 else "without code"
         return f"exception: {name} ({_asked(code)})"

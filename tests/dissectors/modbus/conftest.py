@@ -136,10 +136,10 @@ class PaperBus:
         self.events.append(replace(short, end=self.end))
         return self
 
-    def noise(self, octets: bytes, gap: float = 8.0) -> PaperBus:
+    def noise(self, octets: bytes, gap: float = 8.0, place: Place = Place.BETWEEN) -> PaperBus:
         start = self.end + round(gap * MS)
         self.end = start + len(octets) * self.timing.char
-        self.events.append(Noise(octets, start, self.end, Place.BETWEEN, Reason.NO_FRAME))
+        self.events.append(Noise(octets, start, self.end, place, Reason.NO_FRAME))
         return self
 
     def _put(self, octets: bytes, gap: float) -> PaperBus:
