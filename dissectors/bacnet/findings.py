@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.content_findings import ContentFindings
+from dissectors.bacnet.device_instances import DeviceInstances
 from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_hearing import hearing, takes_unheard, unheard_share
 from dissectors.bacnet.findings_of_overdue import overdue, under_late_answers
@@ -249,6 +250,7 @@ class MstpFindings:
     def __init__(self, timing: Timing) -> None:
         self._observer = BulkRingObserver(timing)
         self._content = ContentFindings()
+        self._instances = DeviceInstances()
         self._refusals = Refusals()
         self._newest: tuple[tuple[int, Event | None], ...] = ()  # the newest two rows, their numbers before them
 
@@ -256,6 +258,7 @@ class MstpFindings:
         """Take the next row: event, its header and placement (None for noise)."""
         self._observer.see(no, event, header)
         self._content.see(no, event, header)
+        self._instances.see(no, event, header)
         self._newest = (*self._newest[-1:], (no, event))
 
     def settle(self, transaction: Transaction) -> None:
@@ -277,6 +280,7 @@ class MstpFindings:
         """Take many rows, and the transactions that closed with them."""
         self._observer.take(rows)
         self._content.take(rows)
+        self._instances.take(rows)
         self._settle_many(rows)
 
     def _settle_many(self, rows: RowColumns) -> None:
@@ -313,5 +317,7 @@ class MstpFindings:
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far, the gravest first."""
-        made = (*judge(self._observer.ring()), *self._refusals.findings(), *self._content.findings())
+        ring = self._observer.ring()
+        others = (*self._refusals.findings(), *self._content.findings(), *self._instances.findings(ring.nodes))
+        made = (*judge(ring), *others)
         return tuple(sorted(made, key=_gravest_first))

@@ -352,6 +352,16 @@ _ALL = (
         explains=("MS1", "MS2", "MS3", "MS4", "LN101", "LN103", "LN2", "LN303"),
     ),
     Rule(
+        "MS502",
+        Severity.WARNING,
+        "one device instance twice",
+        "Two stations say I-Am with the same device instance, in turns, or while both are heard. One after the other "
+        "is only noted: the device may have got another address. 4194303 is nobody's.",
+        "two devices that were given one number, as by a copied configuration: who looks for it finds now the one, now "
+        "the other",
+        "the device instance of the stations named; it is to be unique on all networks that are joined",
+    ),
+    Rule(
         "MS601",
         Severity.INFO,
         "one station uses most of the line",

@@ -107,6 +107,15 @@ def slave_speaks() -> list[Step]:
     return steps
 
 
+def one_instance_twice() -> list[Step]:
+    """22 and 40 say that they are the same device."""
+    steps: list[Step] = []
+    for _ in range(2):
+        steps += [*rounds(3, 7, 22, 40), (2, data(7, 255)), (2, token(7, 22)), (3, data(22, 255, I_AM))]
+        steps += [(2, token(22, 40)), (3, data(40, 255, I_AM)), (2, token(40, 7))]
+    return steps + rounds(3, 7, 22, 40)
+
+
 def last_octet_missing() -> list[Step]:
     """12 asks 31, whose answers end one octet early."""
     steps: list[Step] = []
@@ -298,6 +307,7 @@ MADE = {
     "ms-tp-answers-without-their-first-octet": data_without_first_octet,
     "ms-tp-shut-out-of-the-ring": shut_out,
     "ms-tp-slave-speaks-unasked": slave_speaks,
+    "ms-tp-one-device-instance-twice": one_instance_twice,
     "ms-tp-last-octet-missing": last_octet_missing,
     "ms-tp-number-is-free": number_is_free,
     "ms-tp-number-is-taken": number_is_taken,
