@@ -11,10 +11,9 @@ from dissectors.frame import Event, Frame, Header, Role
 from dissectors.last_silence import fallen_silent
 from dissectors.line import NS_PER_S, Timing
 from dissectors.profibus.blame import ONE_STATION, SentOctets
-from dissectors.profibus.configuration import parse_configuration
-from dissectors.profibus.diagnosis import CONFIGURATION_FAULT, PARAMETER_FAULT
+from dissectors.profibus.diagnosis_findings import codes_of, diagnosis_grave, diagnosis_seen
 from dissectors.profibus.record import RequestsRecord, joined
-from dissectors.profibus.ring import Ring, RingWindow
+from dissectors.profibus.ring import MasterView, Ring, RingWindow
 from dissectors.profibus.rules import RULES, usual_tsdr
 from dissectors.profibus.slave_watch import SlaveView
 from dissectors.profibus.watch import BusWatch, Notice
@@ -128,7 +127,7 @@ class ProfibusFindings:
 
     def _noticed(self, what: Notice, address: int, no: int, time: int) -> None:
         if what is Notice.DIAGNOSIS:
-            for code in self._codes_of(self.watch.slaves[address]):
+            for code in codes_of(self.watch.slaves[address]):
                 self._diagnosed[address][code].add(time, no)
         elif what is Notice.LOCKED:
             self._diagnosed[address]["PB011"].add(time, no)
@@ -136,21 +135,6 @@ class ProfibusFindings:
             self._noted[what, address].add(time, no)
         if what is Notice.MASTER_SILENT:
             self._silent[address] = time
-
-    @staticmethod
-    def _codes_of(slave: SlaveView) -> Iterator[str]:
-        """What a diagnosis that was just told speaks of."""
-        told, given = slave.told, slave.given
-        if told is None:
-            return
-        if told.first & PARAMETER_FAULT:
-            yield "PB004"
-        if told.first & CONFIGURATION_FAULT:
-            yield "PB005"
-        if given is not None and given.ident != told.ident:
-            yield "PB006"
-        if slave.has_trouble:
-            yield "PB009"
 
     def _all(self) -> Iterator[Finding]:
         for address in sorted(self.records):
@@ -213,9 +197,7 @@ class ProfibusFindings:
         who, told, tallies = station(address), slave.told, self._diagnosed.get(address, {})
         words = "" if told is None else "; ".join((*told.status_words, *told.block_words))
         for code, tally in sorted(tallies.items()):
-            yield tally.found(
-                RULES[code], who, self._diagnosis_seen(code, slave, words), self._diagnosis_grave(code, slave)
-            )
+            yield tally.found(RULES[code], who, diagnosis_seen(code, slave, words), diagnosis_grave(code, slave))
         fallen = self._noted.get((Notice.DROP, address))
         if fallen is not None:
             grave = Severity.ERROR if fallen.count >= _LEAST else Severity.WARNING
@@ -237,36 +219,6 @@ class ProfibusFindings:
             tally.add(time)
             seen = f"a diagnosis is announced by {slave.urgent} answers in a row, and not fetched"
             yield tally.found(RULES["PB009"], who, seen)
-
-    @staticmethod
-    def _diagnosis_seen(code: str, slave: SlaveView, words: str) -> str:
-        told, given = slave.told, slave.given
-        if code == "PB006" and told is not None and given is not None:
-            return f"the master gives ident {given.ident:04X}h, the slave has {told.ident:04X}h"
-        if code == "PB005":
-            wanted = "; ".join(module.words for module in parse_configuration(slave.configured)) or "not seen"
-            has = "; ".join(module.words for module in parse_configuration(slave.has))
-            return f"the master configures {wanted}" + (f"; the slave has {has}" if has else "")
-        if code == "PB009" and not slave.has_trouble:
-            return "had a diagnosis to tell, which is gone"
-        if code == "PB011" and told is not None:
-            wanted = " and ".join(str(one) for one in sorted(slave.wanted_by))
-            owner = "another master" if slave.owner is None else f"master {slave.owner}"
-            return f"given parameters by {wanted}; its diagnosis says that it belongs to {owner}"
-        return f"its newest diagnosis: {words or 'nothing to report'}"
-
-    @staticmethod
-    def _diagnosis_grave(code: str, slave: SlaveView) -> Severity:
-        told = slave.told
-        if told is None:
-            return RULES[code].severity
-        still = {
-            "PB004": bool(told.first & PARAMETER_FAULT),
-            "PB005": bool(told.first & CONFIGURATION_FAULT),
-            "PB006": slave.given is not None and slave.given.ident != told.ident,
-            "PB009": slave.has_trouble,
-        }.get(code, True)
-        return RULES[code].severity if still else Severity.NOTE
 
     def _of_alike(self) -> Iterator[Finding]:
         """Answers of a slave that are always damaged in the same way."""
@@ -341,7 +293,7 @@ class ProfibusFindings:
                 seen = f"{tally.count} of {view.polls} polls found nobody"
                 if ring.wasted_share is not None:
                     seen += f"; all masters' take {percent(ring.wasted_share)} of the time"
-                yield tally.found(RULES["PB016"], station(address), seen)
+                yield _of_polls(tally, address, seen, view)
 
     def _of_kept(self) -> Iterator[Finding]:
         kept, ring = self.watch.kept(), self.watch.ring()
@@ -384,6 +336,18 @@ class ProfibusFindings:
 def _grave(count: int, total: int) -> Severity:
     """How grave it is that `count` of `total` are wrong: noted below one in a hundred."""
     return Severity.WARNING if count >= _LEAST and count >= _SHARE * total else Severity.NOTE
+
+
+def _of_polls(tally: Tally, address: int, seen: str, view: MasterView) -> Finding:
+    """Polls that found nobody; who passes no token looks for its slaves with them."""
+    if view.tokens or view.polls < _LEAST:
+        return tally.found(RULES["PB016"], station(address), seen)
+    grave = None if view.answered else Severity.NOTE
+    return replace(
+        tally.found(RULES["PB016"], station(address), f"{seen}; it passes no token", grave),
+        means="a master that asks so whether its slaves are there, before it gives them parameters",
+        next="the supply, address switch and baud rate of the slaves that do not answer",
+    )
 
 
 def _unheard_seen(record: RequestsRecord) -> str:

@@ -49,7 +49,8 @@ RULES: dict[str, Rule] = {
             "PB004",
             Severity.ERROR,
             "parameter fault",
-            "A slave's diagnosis says that it does not take its parameters (Prm_Fault).",
+            "A slave's diagnosis says that it does not take its parameters (Prm_Fault). Only noted where that was told "
+            "before the master gave any here, and not since: it speaks of an earlier start.",
             "parameters of another device or version: the GSD file of the project is not that of the device",
             "compare the parameters and the ident number of the project with the device",
             explains=("PB009",),
@@ -58,7 +59,8 @@ RULES: dict[str, Rule] = {
             "PB005",
             Severity.ERROR,
             "configuration fault",
-            "A slave's diagnosis says that its modules are not those that the master configures (Cfg_Fault).",
+            "A slave's diagnosis says that its modules are not those that the master configures (Cfg_Fault). Only "
+            "noted where that was told before the master gave it anything here, and not since.",
             "modules missing, plugged otherwise or of another length than in the project",
             "compare the modules of the project, slot by slot, with those in the device",
             explains=("PB009",),
@@ -169,7 +171,8 @@ RULES: dict[str, Rule] = {
             "PB016",
             Severity.INFO,
             "GAP polls find nobody",
-            "A master looks for other masters at addresses where none is. That is its duty, and costs time.",
+            "A master looks for other masters at addresses where none is. That is its duty, and costs time. One that "
+            "passes no token looks for its slaves so; noted where it finds none.",
             "the usual case; the highest station address is larger than it need be",
             "a lower highest station address (HSA) in the project saves the time",
         ),

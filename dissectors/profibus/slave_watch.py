@@ -49,6 +49,8 @@ class SlaveView:
     configured: bytes = b""
     has: bytes = b""
     told: Diagnosis | None = None
+    told_after: int = 0  # parameters and configurations that it was given here before its newest diagnosis
+    gifts: int = 0  # the same so far
     unlocked: bool = False
     owner: int | None = None  # the master whose parameters it has, as far as it is known
     wanted_by: set[int] = field(default_factory=set)  # masters that gave it parameters
@@ -160,6 +162,7 @@ class SlaveView:
         if service is Service.DIAGNOSIS:
             said = parse_diagnosis(answer.data)
             return said is not None and self._diagnosed(said, time)
+        self.gifts += service in (Service.SET_PARAMETERS, Service.CHECK_CONFIGURATION)
         if service is Service.SET_PARAMETERS:
             self.given = parse_parameters(asked.data)
             self.unlocked = self.given is not None and bool(self.given.status & UNLOCK)
@@ -187,7 +190,7 @@ class SlaveView:
         return False
 
     def _diagnosed(self, said: Diagnosis, time: int) -> bool:
-        self.told, self.urgent = said, 0
+        self.told, self.told_after, self.urgent = said, self.gifts, 0
         self.diagnoses += 1
         self.faults += bool(said.first & (EXTENDED | CONFIGURATION_FAULT | PARAMETER_FAULT))
         if said.master != NO_MASTER:
@@ -199,6 +202,11 @@ class SlaveView:
         self.drops += fell
         self.become(SlaveState.WAIT_PARAMETERS, time)
         return fell
+
+    @property
+    def is_told_before(self) -> bool:
+        """Whether its newest diagnosis is of before its master gave it anything here, which it did then."""
+        return self.told is not None and not self.told_after and self.gifts > 0
 
     @property
     def has_trouble(self) -> bool:

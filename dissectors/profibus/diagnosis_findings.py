@@ -1,0 +1,64 @@
+"""What the newest diagnosis of a slave says in findings: of what, in which words, and how grave it still is. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from dissectors.findings import Severity
+from dissectors.profibus.configuration import parse_configuration
+from dissectors.profibus.diagnosis import CONFIGURATION_FAULT, PARAMETER_FAULT
+from dissectors.profibus.rules import RULES
+from dissectors.profibus.slave_watch import SlaveView
+
+_OF_BEFORE = ("PB004", "PB005")
+"""Of what a slave was given, and kept until it is given something else."""
+
+
+def codes_of(slave: SlaveView) -> Iterator[str]:
+    """What a diagnosis that was just told speaks of."""
+    told, given = slave.told, slave.given
+    if told is None:
+        return
+    if told.first & PARAMETER_FAULT:
+        yield "PB004"
+    if told.first & CONFIGURATION_FAULT:
+        yield "PB005"
+    if given is not None and given.ident != told.ident:
+        yield "PB006"
+    if slave.has_trouble:
+        yield "PB009"
+
+
+def diagnosis_seen(code: str, slave: SlaveView, words: str) -> str:
+    """What was seen; `words`: of the newest diagnosis."""
+    told, given = slave.told, slave.given
+    if code in _OF_BEFORE and slave.is_told_before:
+        return "told before the master gave it anything here: from an earlier start, or by another project"
+    if code == "PB006" and told is not None and given is not None:
+        return f"the master gives ident {given.ident:04X}h, the slave has {told.ident:04X}h"
+    if code == "PB005":
+        modules = "; ".join(module.words for module in parse_configuration(slave.configured))
+        wanted = f"the master configures {modules}" if modules else "what the master configures was not seen"
+        has = "; ".join(module.words for module in parse_configuration(slave.has))
+        return wanted + (f"; the slave has {has}" if has else "")
+    if code == "PB009" and not slave.has_trouble:
+        return "had a diagnosis to tell, which is gone"
+    if code == "PB011" and told is not None:
+        wanted = " and ".join(str(one) for one in sorted(slave.wanted_by))
+        owner = "another master" if slave.owner is None else f"master {slave.owner}"
+        return f"given parameters by {wanted}; its diagnosis says that it belongs to {owner}"
+    return f"its newest diagnosis: {words or 'nothing to report'}"
+
+
+def diagnosis_grave(code: str, slave: SlaveView) -> Severity:
+    """A note where it is gone, or tells of what is no longer asked for."""
+    told = slave.told
+    if told is None:
+        return RULES[code].severity
+    still = {
+        "PB004": bool(told.first & PARAMETER_FAULT) and not slave.is_told_before,
+        "PB005": bool(told.first & CONFIGURATION_FAULT) and not slave.is_told_before,
+        "PB006": slave.given is not None and slave.given.ident != told.ident,
+        "PB009": slave.has_trouble,
+    }.get(code, True)
+    return RULES[code].severity if still else Severity.NOTE
