@@ -276,10 +276,9 @@ class SnifferApp(Analyzer):
         status = self.status
         if not self.viewing.frozen and not status.reading:
             self.health.look(self.store, final=status.judged >= 1 and not status.live)
-        for header in self.screen.query(StatusHeader):
-            header.bring_up()
-        for bar in self.screen.query(BusBar):
-            bar.bring_up()
+        for child in self.screen.children:  # a query would match every widget there is
+            if isinstance(child, StatusHeader | BusBar):
+                child.bring_up()
 
     # -- what keys do everywhere -------------------------------------------------------------------------------
 

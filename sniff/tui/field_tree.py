@@ -10,13 +10,12 @@ from typing import ClassVar
 from rich.segment import Segment
 from textual import events
 from textual.binding import Binding, BindingType
-from textual.geometry import Size
 from textual.message import Message
-from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
 from sniff.analysis.packet_tree import Field
 from sniff.tui.key_names import named
+from sniff.tui.line_view import LineView
 
 SHIFT = 16
 """Cells by which long lines scroll at once."""
@@ -35,7 +34,7 @@ class _Line:
         return len(self.path) - 1
 
 
-class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
+class FieldTree(LineView, inherit_bindings=False):
     """Moving in it picks a field; place and folds stay when the next frame has the same fields."""
 
     BINDINGS: ClassVar[list[BindingType]] = named(
@@ -99,7 +98,7 @@ class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
         self._lines = []
         self._unfold(self.fields, ())
         self.cursor = min(self.cursor, max(0, len(self._lines) - 1))
-        self.virtual_size = Size(0, len(self._lines))
+        self.set_length(len(self._lines))
         self.refresh()
 
     def _unfold(self, fields: tuple[Field, ...], above: Path) -> None:

@@ -8,9 +8,7 @@ from rich.segment import Segment
 from rich.style import Style
 from textual import events
 from textual.binding import Binding, BindingType
-from textual.geometry import Size
 from textual.message import Message
-from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
 from dissectors.frame import Mark
@@ -18,6 +16,7 @@ from sniff.analysis.sanitizing import ascii_of
 from sniff.analysis.wording import mark_names
 from sniff.tui.frame_list import mark_letter
 from sniff.tui.key_names import named
+from sniff.tui.line_view import LineView
 
 WIDE = 72
 """Width in cells from which 16 octets stand on a line instead of 8."""
@@ -25,7 +24,7 @@ NAMED_MARKS = 64
 """Line errors that are also written out in words below the dump."""
 
 
-class HexPane(ScrollView, can_focus=True, inherit_bindings=False):
+class HexPane(LineView, inherit_bindings=False):
     """A line error is a letter after its octet; the octets of the field are in reverse video."""
 
     BINDINGS: ClassVar[list[BindingType]] = named(
@@ -94,7 +93,7 @@ class HexPane(ScrollView, can_focus=True, inherit_bindings=False):
 
     def _measure(self) -> None:
         lines = -(-len(self.octets) // self.per_line)
-        self.virtual_size = Size(0, 1 + lines + len(self.notes))
+        self.set_length(1 + lines + len(self.notes))
         self.scroll_to(y=0, animate=False, force=True)
         self.refresh()
 

@@ -52,6 +52,7 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
     COMPONENT_CLASSES: ClassVar[set[str]] = {
         "line-list--title",
         "line-list--cursor",
+        "line-list--cursor-with-keys",
         "line-list--bad",
         "line-list--doubt",
         "line-list--good",
@@ -269,6 +270,9 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
         if self.cursor in self.index:
             self.post_message(self.Chosen(self, self.cursor))
 
+    def watch_has_focus(self, _has_focus: bool) -> None:
+        """The cursor's look is chosen as it is drawn: Textual would match its sheets to every style of the list."""
+
     # -- mouse -------------------------------------------------------------------------------------------------
 
     def on_click(self, event: events.Click) -> None:
@@ -311,7 +315,11 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
         self.drawn_lines += 1
         number = self.index[line]
         cells = [self.edge(number), *pieces(self.columns, self._shifted(self.cells(number, line)))]
-        return self._strip(cells, width, "cursor" if number == self.cursor else "")
+        return self._strip(cells, width, self._cursor_style if number == self.cursor else "")
+
+    @property
+    def _cursor_style(self) -> str:
+        return "cursor-with-keys" if self.has_focus else "cursor"
 
     def _shifted(self, cells: dict[str, Cell]) -> dict[str, Cell]:
         """The cells with the text scrolled; what stands left of the screen is "…"."""

@@ -127,12 +127,14 @@ class Prompt(Vertical):
 
     def __init__(self) -> None:
         super().__init__()
+        self.display = False
         self.purpose = ""
         self._check: Check = lambda text: ""
         self._complete: Complete | None = None
         self._before: Sequence[str] = ()
         self._at = 0
         self._is_answered = False
+        self._said: str | None = None  # in the line that judges
 
     def compose(self) -> ComposeResult:
         """A line to type in and a line that judges it."""
@@ -160,14 +162,14 @@ class Prompt(Vertical):
         field.placeholder = hint
         field.value = text
         field.cursor_position = len(text)
-        self.add_class("open")
+        self.display = True  # not by a class: the sheets would be matched to all that is in it
         field.focus()
         self._judge(text)
 
     @property
     def is_open(self) -> bool:
         """Whether it is to be seen."""
-        return self.has_class("open")
+        return self.display
 
     @property
     def is_asking(self) -> bool:
@@ -186,7 +188,9 @@ class Prompt(Vertical):
             verdict = ""
         if self._complete is not None:
             verdict = f"{verdict}{self._ways(text)}"
-        self.query_one("#validity", Label).update(sanitized(verdict))
+        if verdict != self._said:  # every update lays the whole screen out
+            self._said = verdict
+            self.query_one("#validity", Label).update(sanitized(verdict))
         self.set_class(bool(wrong), "invalid")
         return wrong
 
@@ -237,5 +241,5 @@ class Prompt(Vertical):
             self._close()
 
     def _close(self) -> None:
-        self.remove_class("open")
+        self.display = False
         self.post_message(self.Closed())

@@ -6,7 +6,10 @@ from typing import Any, ClassVar
 
 from textual import events
 from textual.app import ComposeResult
+from textual.messages import Layout
+from textual.reactive import Reactive
 from textual.screen import Screen
+from textual.scrollbar import ScrollBar
 from textual.widget import Widget
 
 from sniff.bus.rows import Store
@@ -36,6 +39,9 @@ class ViewScreen(Screen[None]):
     LEGEND: ClassVar[tuple[tuple[str, str], ...]] = ()  # marks and titles of this screen, for its help page
     AUTO_FOCUS: ClassVar[str] = "#main"
     VERTICAL_BREAKPOINTS: ClassVar[list[tuple[int, str]]] = [(0, "-low"), (LOW, "-high")]  # type: ignore[misc]
+
+    focused: Reactive[Widget | None] = Reactive(None, repaint=False)
+    """What has the keys. Who gets and who loses them is drawn anew; Textual draws the whole screen."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         """Keys have names, so that a configuration can give others."""
@@ -87,6 +93,20 @@ class ViewScreen(Screen[None]):
             self.notify(said, severity="warning", timeout=4, markup=False)
         self.viewing.is_small = is_small
 
+    def on_layout(self, message: Layout) -> None:
+        """A scroll bar has its place from the list that it belongs to; Textual lays the screen out a second time when
+        one has become longer."""
+        if isinstance(message.widget, ScrollBar):
+            message.stop()
+            message.prevent_default()
+
+    def _compositor_refresh(self) -> None:
+        """Draw all that waits for it at once: Textual draws what has another size now, and again when its own word of
+        it has come through the queue."""
+        shown = self._compositor.visible_widgets
+        self._compositor.update_widgets({widget for widget in shown if widget._repaint_regions})
+        super()._compositor_refresh()
+
     def on_screen_resume(self) -> None:
         """Shown (again): catch up."""
         analyzer(self).draw_screen()
@@ -96,8 +116,8 @@ class ViewScreen(Screen[None]):
         return self.query_one(self.AUTO_FOCUS, Widget)
 
     def on_prompt_heard(self) -> None:
-        """Closing lays out the whole screen: what was asked for is painted first."""
-        self.call_after_refresh(self.query_one(Prompt).close_answered)
+        """What was asked for is done: closing lays the screen out, and both are drawn at once."""
+        self.query_one(Prompt).close_answered()
 
     def on_prompt_closed(self) -> None:
         """Back to where the keys were, unless the prompt asks again; at once, for a key may follow."""

@@ -157,10 +157,12 @@ class FramesScreen(ListingScreen):
             details.border_title = said
 
     def _plan_detail(self) -> None:
-        self._say_which()
+        is_following = self.viewing.follow and not self.viewing.frozen
+        if is_following:  # a moment is not worth to be drawn twice
+            self._say_which()
         if self._state() == self._detail or self._detail_timer is not None:
             return
-        delay = FOLLOWING_SECONDS if self.viewing.follow and not self.viewing.frozen else DETAIL_SECONDS
+        delay = FOLLOWING_SECONDS if is_following else DETAIL_SECONDS
         if self._detail is None:  # beside the first row there must not stand nothing for long, but the list comes first
             delay = FIRST_SECONDS
         self._detail_timer = self.set_timer(delay, self._show_detail)
