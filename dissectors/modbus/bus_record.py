@@ -33,6 +33,7 @@ _CLOSE_KEPT = 4096
 _HASTY_KEPT = 256
 _CROSSED_KEPT = 256
 _WORDS_KEPT = 16
+_ELSEWHERE = 10  # of so many answers of its own one by another: what is rarer answered a request that was lost
 _LATE_KEPT = 4096
 
 PAUSE_MARGIN = 5
@@ -278,6 +279,11 @@ class BusRecord:
         """The record of one unit that answers for another."""
         is_kept = pair in self.pairs or len(self.pairs) < _SENDERS_KEPT
         return self.pairs.setdefault(pair, Tally()) if is_kept else self.unasked
+
+    def is_answered_elsewhere(self, asked: int, answered: int) -> bool:
+        """Whether one unit answers for another as a rule, and not where a request to itself was lost."""
+        tally, own = self.pairs.get((asked, answered)), self.stations.get(asked)
+        return tally is not None and (own is None or _ELSEWHERE * tally.count >= own.answered)
 
     def ended_oddly(self, sender: str) -> int:
         """Frames of a sender that are damaged by their end alone."""

@@ -219,8 +219,10 @@ class RowObserver(Remembered):
         return soonest <= gap < TURNAROUND
 
     def _is_answer_of_another(self, before: AskedRequest, asked: AskedRequest) -> bool:
-        """Whether what looks like a request is the copy of the one before it, by a unit that is known to answer so."""
-        return asked.octets[1:] == before.octets[1:] and (before.unit, asked.unit) in self.seen.pairs
+        """Whether what looks like a request is the copy of the one before it, by a unit that is known to answer so: a
+        read is no answer, and where the station mostly answers itself, another's answer was one to a lost request."""
+        may_be = asked.header.role is not Role.REQUEST and asked.octets[1:] == before.octets[1:]
+        return may_be and self.seen.is_answered_elsewhere(before.unit, asked.unit)
 
     def _gather(self, event: Event) -> None:
         """Keep octets that are no good frame, in the transaction of the newest request."""

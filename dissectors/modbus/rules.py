@@ -135,7 +135,7 @@ _ALL = (
         "the order of one master whose timeout is too short.",
         "two masters on one bus, or a commissioning tool left connected",
         "find the second master; a bus has one, use a gateway or multiplexer for more",
-        explains=(*_OF_COLLISIONS, "MB020", "MB002", "MB003", "MB201", "MB202", "MB302", "LN205", "LN302"),
+        explains=(*_OF_COLLISIONS, "MB020", "MB002", "MB003", "MB201", "MB202", "MB206", "MB302", "LN205", "LN302"),
     ),
     Rule(
         "MB204",
@@ -159,8 +159,9 @@ _ALL = (
         "MB206",
         Severity.WARNING,
         "answered from another address",
-        "Requests to one address that a station with another address answers. At least two. A note where the master "
-        "never repeats such a request: it takes the answers.",
+        "Requests to one address that a station with another address answers. At least two, and one for ten answers "
+        "of its own: what is rarer answered a request that was lost. A note where the master never repeats such a "
+        "request: it takes the answers.",
         "a device that always answers so (some battery systems do), or a wrong address in the master's list",
         "if the master takes these answers, nothing; else the address in its list",
         explains=("MB002", "MB104", "MB207"),

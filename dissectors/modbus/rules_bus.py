@@ -97,18 +97,20 @@ def _of_bus(seen: BusRecord, is_blamed: bool, scanned: list[int], unheard: list[
         if new:
             words += f"; {units(new)} {'was' if len(new) == 1 else 'were'} never asked for anything"
         yield tally.found(RULES["MB204"], "bus", words, note_if(tally.count == 1))
+    told = {pair for pair, tally in seen.pairs.items() if tally.count >= 2 and seen.is_answered_elsewhere(*pair)}
     for (asked, answered), tally in sorted(seen.pairs.items()):
-        if tally.count >= 2:
+        if (asked, answered) in told:
             words = f"{tally.count} requests to station {asked} answered by station {answered}"
             repeated = seen.repeated_elsewhere[asked]
             words += f"; the master asked again {times(repeated)}" if repeated else "; the master never asked again"
             elsewhere = tally.found(RULES["MB206"], f"station {asked}", words, note_if(not repeated))
             to_any = f"{asked} is this maker's address for whoever is there; or {RULES['MB206'].means}"
             yield replace(elsewhere, means=to_any) if asked > MAX_UNIT else elsewhere
-    unasked = seen.unasked
+    by_chance = [tally for pair, tally in seen.pairs.items() if tally.count >= 2 and pair not in told]
+    unasked = together((seen.unasked, *by_chance))
     if unasked.count:
         words = f"{unasked.count} of {counted(seen.answers, 'answer')} came unasked"
-        of_themselves = unasked.count - seen.unasked_behind_noise
+        of_themselves = seen.unasked.count - seen.unasked_behind_noise
         many = of_themselves >= 3 and 100 * of_themselves >= seen.answers
         yield unasked.found(RULES["MB207"], "bus", words, Severity.WARNING if many else None)
     yield from _cycle(seen)
