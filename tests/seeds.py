@@ -29,3 +29,9 @@ def examples(many: int) -> int:
 def some(things: Sequence[T], every: int) -> Sequence[T]:
     """All of them in a search, every n-th in the suite."""
     return things if IS_SEARCH else things[::every]
+
+
+def in_turn(things: Sequence[T], place: int, of: int) -> Sequence[T]:
+    """What one of several tests takes that ask much the same of many things: all in a search; in the suite each thing
+    goes to every `of`-th of the tests, to each of which belongs a `place` (0 …)."""
+    return things if IS_SEARCH else things[place % of :: of]

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.seeds import IS_SEARCH, some
+from tests.seeds import IS_SEARCH, in_turn, some
 
 CAPTURES = Path(__file__).parents[3] / "captures"
 LARGE = 30_000
@@ -42,9 +42,9 @@ WORDS = (
 CUTS = ("--frames 3-9", "--from +0.2 --to +1.5")
 
 
-@pytest.mark.parametrize("words", WORDS)
-def test_the_same_is_said(words: str, sniff485: Callable[..., Any]) -> None:
-    for path in NAMES:
+@pytest.mark.parametrize(("place", "words"), [*enumerate(WORDS)])
+def test_the_same_is_said(place: int, words: str, sniff485: Callable[..., Any]) -> None:
+    for path in in_turn(NAMES, place, 2):
         command = [str(path) if word == "FILE" else word for word in words.split()]
         command += [] if "FILE" in words else [str(path)]
         assert sniff485(*command) == sniff485(*command, "--reference")
