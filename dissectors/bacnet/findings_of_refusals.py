@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from dissectors.bacnet import message as messages
 from dissectors.bacnet.ring_remarks import listed
@@ -19,6 +19,29 @@ REFUSED_KEPT = 512
 _DIFFERENT_KEPT = 64
 _NOT_SUPPORTED = frozenset(("property unknown-property", "reject unrecognized-service"))
 """What a device says of something that it may have or not."""
+
+
+_SMALLER = (
+    "ask for less at once: single properties, elements of a list by their index; what both sides say of segmentation "
+    "and of the longest message they take"
+)
+_BUSY = "load and firmware of the station, and of what it asks itself; ask seldom or later again"
+_NEXT = {
+    "segmentation-not-supported": _SMALLER,
+    "buffer-overflow": _SMALLER,
+    "apdu-too-long": _SMALLER,
+    "insufficient-segments": _SMALLER,
+    "out-of-resources": _BUSY,
+    "tsm-timeout": _BUSY,
+    "application-exceeded-reply-time": _BUSY,
+    "preempted-by-higher-priority-task": _BUSY,
+    "busy": _BUSY,
+    "timeout": _BUSY,
+    "write-access-denied": "whether the property can be written at all, or only while out-of-service is true; who may",
+    "value-out-of-range": "the value that is sent, against the limits of the object",
+    "invalid-data-type": "the type of the value that is sent, against that of the property; Null gives it up",
+}
+"""What to do next, by the last word of what a station says; of others, what the rule says."""
 
 
 @dataclass(slots=True)
@@ -73,7 +96,8 @@ class Refusals:
                 f"{_error(words)} in answer to {some}{', each for something else' if looks and tally.count > 1 else ''}"
             )
             severity = Severity.NOTE if looks or tally.count == 1 else None
-            yield tally.found(RULES["MS305"], f"MAC {mac}", seen, severity)
+            finding = tally.found(RULES["MS305"], f"MAC {mac}", seen, severity)
+            yield replace(finding, next=_NEXT.get(words.split()[-1], finding.next))
 
     def _common(self) -> Iterable[tuple[str, str]]:
         """What is asked for that no station has: each of several refuses it, none that is asked does not."""

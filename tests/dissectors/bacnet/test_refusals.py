@@ -61,3 +61,14 @@ def test_what_was_asked_for_is_not_known_and_may_be_the_same_again():
     unknown = OPTIONAL[0], "", OPTIONAL[1], ""
     assert found({7: unknown}, answered={3: 8}) == [("MAC 7", Severity.WARNING, 4)]
     assert found({7: ("",)}, answered={3: 8}) == [("MAC 7", Severity.NOTE, 1)]
+
+
+def test_what_to_do_next_follows_the_reason():
+    """Who cannot send so much at once has what it was asked for; it must be asked for less."""
+    refusals = Refusals()
+    for no, error in enumerate(("abort segmentation-not-supported", "abort tsm-timeout", UNKNOWN, "device busy") * 2):
+        refusals.refuse(9, Transaction(no, 9, READ, 2 * no, 2 * no + 1, Verdict.EXCEPTION, no, no, error=error), None)
+    advice = {one.seen.split(" in answer")[0]: one.next for one in refusals.findings()}
+    assert "ask for less" in advice["abort segmentation-not-supported"]
+    assert "load" in advice["abort tsm-timeout"] and "load" in advice["error device busy"]
+    assert "take what it has not out" in advice[f"error {UNKNOWN}"]
