@@ -34,6 +34,7 @@ from dissectors.n2.exchange import GIVE_UP, Exchange, best_owed, closed_exchange
 from dissectors.n2.forms import may_answer
 from dissectors.n2.header import BROADCAST, meant
 from dissectors.n2.known import KnownStations
+from dissectors.n2.masters import HASTE
 from dissectors.n2.relay import Relay
 from dissectors.n2.station_times import FEW, StationTimes
 from dissectors.n2.stretch import STRAY
@@ -55,7 +56,7 @@ class N2Tracker:
     def __init__(self, timing: Timing) -> None:
         self._latency = timing.latency
         self._char = timing.char
-        self._at_once = max(timing.t35, timing.char + timing.latency)
+        self._at_once = max(timing.t35, timing.char + min(timing.latency, HASTE))  # a repeat comes later
         self._next = 1
         self._open: Exchange | None = None
         self._missed: Exchange | None = None  # the last command, closed without a good answer
