@@ -17,6 +17,10 @@ from dissectors.modbus.promptness import AT_ONCE, has_no_layout
 ECHO_VOTES = 4
 """Answered requests with an echo, or without, that count at most against what is seen now."""
 
+OWN_VOTES = 2
+"""Answered requests of one station without an echo, more than with one, from which on what comes back at once on this
+bus comes of another station."""
+
 MOST_VOTES = 2 * ECHO_VOTES
 """More answers without an echo than these decide nothing."""
 
@@ -37,6 +41,7 @@ class Echoes:
         self.limit = max(soonest, timing.char + timing.latency)
         self.usual: bool | None = None
         self._votes = 0  # answered requests with an echo, less those without
+        self._votes_of: dict[int, int] = {}  # the same by station
         self._gaps: deque[int] = deque(maxlen=_GAPS_KEPT)  # before the newest echoes of requests that are surely some
 
     def is_of_request(self, newest: Exchange | None, seen: Seen) -> bool:
@@ -58,7 +63,7 @@ class Echoes:
         if request.echoed or latency.low > max(self.limit, self._usual_gap() * 3 // 2):
             return False
         if self.usual is not None:
-            return self.usual
+            return self.is_usual_of(request.unit)
         if not latency.nominal:
             return False  # both came in one read, which says nothing of the time between
         if latency.high < self._soonest:
@@ -76,7 +81,7 @@ class Echoes:
     def owes_answer(self, request: Exchange, seen: Seen) -> bool:
         """Whether the copy that was taken for the answer to a request was its echo, as this bus has one of each, and
         `seen` is the answer."""
-        if not self.usual or request.copied is None or request.echoed or not request.answered:
+        if request.copied is None or request.echoed or not request.answered or not self.is_usual_of(request.unit):
             return False
         return request.octets == seen.octets or (has_no_layout(seen) and request.is_for(seen.octets))
 
@@ -114,12 +119,18 @@ class Echoes:
             return False
         return seen.frame.start - end < self.limit and is_begin_of(seen.frame.octets, last.request.frame.octets)
 
-    def learn(self, echoed: bool) -> None:
+    def is_usual_of(self, unit: int) -> bool:
+        """Whether requests to that station come back at once: on this bus, or else from another station alone."""
+        return bool(self.usual) and self._votes_of.get(unit, 0) > -OWN_VOTES
+
+    def learn(self, unit: int, echoed: bool) -> None:
         """One more request that a station answered, with its copy before the answer or without. One says little where
         many were otherwise: a late read puts a repeat directly behind the request."""
+        vote = 1 if echoed else -1
+        self._votes_of[unit] = max(-ECHO_VOTES, min(ECHO_VOTES, self._votes_of.get(unit, 0) + vote))
         if self.usual is None or (echoed and not self._votes):
             self.usual = echoed
-        self._votes = max(-ECHO_VOTES, min(ECHO_VOTES, self._votes + (1 if echoed else -1)))
+        self._votes = max(-ECHO_VOTES, min(ECHO_VOTES, self._votes + vote))
         if self._votes:
             self.usual = self._votes > 0
 

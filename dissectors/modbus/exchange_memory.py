@@ -65,15 +65,15 @@ class Passed:
     """What the tracker would remember of exchanges that went by without it, beside the first request's pause.
 
     `times`: the newest response times of each station and pace, ns, in order. `pauses`: the master's newest, ns, each
-    with the time since the request before. `sure`: answers that had no echo before them. `answered`: places of the
-    newest exchanges that were answered, in order; `given_up`: of those that were not, `unanswered`: how long the
-    master waited for them, ns. `units`: stations that answered; `heard`: each of
-    them with the place of its last answer.
+    with the time since the request before. `sure`: by station, answers that had no echo before them. `answered`:
+    places of the newest exchanges that were answered, in order; `given_up`: of those that were not, `unanswered`: how
+    long the master waited for them, ns. `units`: stations that answered; `heard`: each of them with the place of its
+    last answer.
     """
 
     times: Mapping[tuple[int, int], Sequence[int]]
     pauses: Sequence[tuple[int, int]]
-    sure: int
+    sure: Mapping[int, int]
     answered: Sequence[int]
     units: frozenset[int]
     given_up: Sequence[int]
@@ -223,7 +223,7 @@ def passed(found: ExchangeColumns, frames: FrameColumns, place: int, end: int) -
     return Passed(
         times,
         list(zip(pause.tolist(), cycle.tolist(), strict=True)),
-        int((found.sure[part] & answered).sum()),
+        {one: count for one, count in enumerate(np.bincount(unit[found.sure[part] & answered]).tolist()) if count},
         (place + answers[-ANSWERED:]).tolist(),
         frozenset(units.tolist()),
         (place + unanswered[-GIVEN_UP:]).tolist(),

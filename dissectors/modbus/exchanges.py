@@ -124,7 +124,8 @@ class Exchanges:
     def _may_be_copy(self, request: Exchange) -> bool:
         """Whether what looks like a request and got nothing may be an answer: where requests have no echo, one that had
         one; where all have, a repeat without."""
-        return not self._echoes.usual if request.echoed else bool(self._echoes.usual) and request.attempt > 1
+        usual = self._echoes.is_usual_of(request.unit)
+        return not usual if request.echoed else usual and request.attempt > 1
 
     def drop_chain(self, verdict: Verdict) -> None:
         """Close the requests that waited for the open one, in the order they came."""

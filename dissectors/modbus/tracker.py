@@ -236,7 +236,7 @@ class ModbusTracker(TrackerMemory):
         pause = max(0, seen.frame.start - request.last_end)
         gap = request.gap(request.copies[0].frame.start)
         if pause < self._echoes.limit and not self._may_be_next(pause, seen):  # whichever it was, this repeats it
-            if self._echoes.usual:
+            if self._echoes.is_usual_of(request.unit):
                 return self._echo(seen)
             return self._answered_again(seen, request)
         if newest.octets != request.octets:  # the newest was a request, and this answers it
@@ -344,7 +344,7 @@ class ModbusTracker(TrackerMemory):
 
     def _may_be_answered_by(self, before: Exchange, seen: Seen) -> bool:
         """Whether an equal request that comes later than answers usually do may be a slow answer all the same."""
-        if before.sure or not self._is_plain(before) or (before.echoed and not self._echoes.usual):
+        if before.sure or not self._is_plain(before) or (before.echoed and not self._echoes.is_usual_of(before.unit)):
             return False
         gap = before.gap(seen.frame.start)
         return len(self._held.chain) < _CHAIN_MOST and (self.timeout is None or gap < self.timeout * 9 // 10)

@@ -92,7 +92,7 @@ class TrackerMemory:
             request.copied = gap
         elif request.sure and seen.header.role is Role.RESPONSE and not (why or request.fault):
             self.learnt.answered(request.unit, request.pace, gap)
-            self._echoes.learn(request.echoed)
+            self._echoes.learn(request.unit, request.echoed)
 
     def _note_mode(self, request: Exchange) -> None:
         """Listen-only mode begins with its command and ends with a restart, or when the unit speaks again."""
@@ -134,8 +134,9 @@ class TrackerMemory:
             self.learnt.answered_often(unit, pace, times)
         self.learnt.paused_often(went.pauses)
         self.learnt.waited(went.unanswered)
-        for _ in range(min(went.sure, MOST_VOTES)):
-            self._echoes.learn(False)
+        for unit, count in went.sure.items():
+            for _ in range(min(count, MOST_VOTES)):
+                self._echoes.learn(unit, False)
         self._held.pass_by(by.newest, by.given_up, by.heard, by.count)
         self._last_end, self._last_was_answer = by.end, by.newest[-1].answered
         self._mute -= went.units

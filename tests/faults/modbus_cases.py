@@ -170,6 +170,13 @@ MODBUS_CASES: tuple[Case, ...] = (
         seeds=1,
     ),
     Case(
+        "RTU station copies the request before its answer, FTDI",
+        partial(modbus, change={2: partial(Rewrites, rewrite=copied_before)}),
+        (("MB018", "station 2"),),
+        FTDI,
+        seeds=1,
+    ),
+    Case(
         "RTU check of one station computed otherwise",
         partial(modbus, change={2: partial(Rewrites, rewrite=other_check)}),
         (("MB021", "station 2"),),
