@@ -94,52 +94,85 @@ def guess(heard: HeardPlaces, profile: Profile) -> Guess:
     the device: other devices have numbers like these too. What may hold any value tells little. Signs of identity weigh
     four places, a wrong one rules it out.
     """
-    total = weight = 0.0
-    places = known = strange = 0
-    is_named = False
-    for (space, address, part), reading in heard.answered.items():
-        if part or any(sign.value is not None and sign.is_of(reading) for sign in profile.signs):
-            continue
-        places += 1
-        entry = profile.at(space, address)
-        if profile.is_reserved(space, address):
-            total += 1.0 if reading.raw else _RESERVED_WEIGHT
-            weight += _RESERVED_WEIGHT
-            continue
-        if entry is None:
-            total += 1
-            continue
-        known += 1
-        worth = _worth(entry)
-        total += worth
-        fits = all(value.bit or _is_allowed(entry, value) for value in decode(profile, (reading,)))
-        strange += not fits
-        weight += worth if fits else _STRANGE_SHARE * worth
-    refused = sum(profile.at(*place) is not None for place in heard.refused)
-    words = [f"{known} of {places} places known"]
-    words += [f"{strange} not allowed"] if strange else []
-    words += [f"{refused} refused that it should have"] if refused else []
-    total += refused
-    for (space, _, part), reading in heard.answered.items():
-        if space == "device" and part in profile.constants:
-            same = reading.value == profile.constants[part]
-            is_named |= same and part.endswith("-name")  # a version or a place may be anybody's
-            total += _CONSTANT_WEIGHT
-            weight += _CONSTANT_WEIGHT if same else 0
-            words.append(f"{part} {'fits' if same else 'is another'}")
     for sign in profile.signs:
-        verdict = _check(sign, heard)
-        if verdict is False:
+        if _check(sign, heard) is False:
             return Guess(heard.station, profile, 0.0, f"{_name(sign, profile)} says otherwise")
-        if verdict:
-            is_named |= sign.value is not None
-            total += _SIGN_WEIGHT
-            weight += _SIGN_WEIGHT
-            words.append(f"{_name(sign, profile)} {'is there' if sign.value is None else 'fits'}")
-    if not is_named:
-        total += _UNNAMED_WEIGHT
-        words.append("nothing was read that names it")
-    return Guess(heard.station, profile, weight / total if total else 0.0, ", ".join(words))
+    weighing = _Weighing(heard, profile)
+    weighing.weigh_places()
+    weighing.weigh_refusals()
+    weighing.weigh_constants()
+    weighing.weigh_signs()
+    weighing.weigh_silence()
+    return Guess(heard.station, profile, weighing.share, ", ".join(weighing.words))
+
+
+class _Weighing:
+    """What speaks for a profile (`_weight`) of all that could (`_total`), in words too."""
+
+    def __init__(self, heard: HeardPlaces, profile: Profile) -> None:
+        self.words: list[str] = []
+        self._heard, self._profile = heard, profile
+        self._total = self._weight = 0.0
+        self._is_named = False
+
+    @property
+    def share(self) -> float:
+        """0 … 1."""
+        return self._weight / self._total if self._total else 0.0
+
+    def weigh_places(self) -> None:
+        """Registers and objects that were answered: known ones, with what they hold, reserved and unknown ones."""
+        places = known = strange = 0
+        for (space, address, part), reading in self._heard.answered.items():
+            if part or any(sign.value is not None and sign.is_of(reading) for sign in self._profile.signs):
+                continue
+            places += 1
+            entry = self._profile.at(space, address)
+            if self._profile.is_reserved(space, address):
+                self._add(_RESERVED_WEIGHT, 1.0 if reading.raw else _RESERVED_WEIGHT)
+            elif entry is None:
+                self._add(0, 1)
+            else:
+                known += 1
+                worth = _worth(entry)
+                fits = all(value.bit or _is_allowed(entry, value) for value in decode(self._profile, (reading,)))
+                strange += not fits
+                self._add(worth if fits else _STRANGE_SHARE * worth, worth)
+        self.words.append(f"{known} of {places} places known")
+        self.words += [f"{strange} not allowed"] if strange else []
+
+    def weigh_refusals(self) -> None:
+        """Places that the device should have, and refused to give."""
+        refused = sum(self._profile.at(*place) is not None for place in self._heard.refused)
+        self.words += [f"{refused} refused that it should have"] if refused else []
+        self._add(0, refused)
+
+    def weigh_constants(self) -> None:
+        """Properties of the device itself."""
+        for (space, _, part), reading in self._heard.answered.items():
+            if space == "device" and part in self._profile.constants:
+                same = reading.value == self._profile.constants[part]
+                self._is_named |= same and part.endswith("-name")  # a version or a place may be anybody's
+                self._add(_CONSTANT_WEIGHT if same else 0, _CONSTANT_WEIGHT)
+                self.words.append(f"{part} {'fits' if same else 'is another'}")
+
+    def weigh_signs(self) -> None:
+        """Signs of identity that were seen; none of them is wrong."""
+        for sign in self._profile.signs:
+            if _check(sign, self._heard):
+                self._is_named |= sign.value is not None
+                self._add(_SIGN_WEIGHT, _SIGN_WEIGHT)
+                self.words.append(f"{_name(sign, self._profile)} {'is there' if sign.value is None else 'fits'}")
+
+    def weigh_silence(self) -> None:
+        """Nothing names the device: others have numbers like these, too."""
+        if not self._is_named:
+            self._add(0, _UNNAMED_WEIGHT)
+            self.words.append("nothing was read that names it")
+
+    def _add(self, weight: float, total: float) -> None:
+        self._weight += weight
+        self._total += total
 
 
 def _check(sign: Sign, heard: HeardPlaces) -> bool | None:

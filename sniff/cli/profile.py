@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dissectors.line import MS
 from dissectors.profiles import ProfileError
 from dissectors.profiles.decoding import bare_range, number, plain_name, state_words
-from dissectors.profiles.model import Entry, Profile
+from dissectors.profiles.model import Entry, Limits, Profile
 from dissectors.profiles.parsing import is_name
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.offline import survey
@@ -114,44 +114,53 @@ def _show(args: argparse.Namespace) -> int:
         for entry in profile.entries:
             print(json_output.dumps(_as_json(entry)))
         return 0
-    maker = "; ".join(filter(None, (profile.vendor, ", ".join(profile.models))))
-    print(f"{profile.name}: {profile.title}" + (f" ({maker})" if maker else ""))
-    print(f"protocols: {', '.join(profile.protocols)}")
-    print(f"source: {profile.source or 'none is said'}")
-    for family, limits in profile.limits.items():
-        if limits.frame is not None:
-            print(f"{family} longest frame: {limits.frame} octets")
-        if limits.response is not None:
-            print(f"{family} answers within: {limits.response / MS:g} ms")
-        if limits.responses:
-            by_rate = ", ".join(f"{rate} Bd {most / MS:g} ms" for rate, most in sorted(limits.responses.items()))
-            print(f"{family} answers within: {by_rate}")
-        if limits.stations is not None:
-            print(f"{family} station numbers: {limits.stations[0]} … {limits.stations[1]}")
-        if limits.functions is not None:
-            print(f"{family} functions: {' '.join(f'{code:02X}' for code in sorted(limits.functions))} (hex)")
-        if limits.unexecuted:
-            print(f"{family} acknowledges and does not do: {_told(limits.unexecuted)}")
-        if limits.read_only:
-            print(f"{family} attributes that are read only: {_told(limits.read_only)}")
-    for family, codes in profile.exceptions.items():
-        for code, words in codes.items():
-            print(f"{family} error {code:02d} ({code:02X}h): {words}")
-    for key, value in (*profile.constants.items(), *profile.facts.items()):
-        print(f"{key}: {value}")
-    for first, last in profile.reserved:
-        offset = profile.address_offset
-        wire = f" = wire 0x{first:04X} … 0x{last:04X}" if offset else ""
-        print(f"reserved: {first - offset:04X}h … {last - offset:04X}h{wire}")
-    if profile.absent:
-        print(f"parameters without a register: {' '.join(profile.absent)}")
-    if profile.address_offset:
-        print(f"on the wire a register is the manual's number {profile.address_offset:+d}; both are in the table")
+    for line in _said(profile):
+        print(line)
     print()
     tables.write(ENTRY_HEADINGS, [_row(entry) for entry in profile.entries])
     _print_codes(profile)
     _print_properties(profile)
     return 0
+
+
+def _said(profile: Profile) -> Iterator[str]:
+    """What a profile says beside its registers and objects."""
+    maker = "; ".join(filter(None, (profile.vendor, ", ".join(profile.models))))
+    yield f"{profile.name}: {profile.title}" + (f" ({maker})" if maker else "")
+    yield f"protocols: {', '.join(profile.protocols)}"
+    yield f"source: {profile.source or 'none is said'}"
+    for family, limits in profile.limits.items():
+        yield from _limits(family, limits)
+    for family, codes in profile.exceptions.items():
+        yield from (f"{family} error {code:02d} ({code:02X}h): {words}" for code, words in codes.items())
+    yield from (f"{key}: {value}" for key, value in (*profile.constants.items(), *profile.facts.items()))
+    for first, last in profile.reserved:
+        offset = profile.address_offset
+        wire = f" = wire 0x{first:04X} … 0x{last:04X}" if offset else ""
+        yield f"reserved: {first - offset:04X}h … {last - offset:04X}h{wire}"
+    if profile.absent:
+        yield f"parameters without a register: {' '.join(profile.absent)}"
+    if profile.address_offset:
+        yield f"on the wire a register is the manual's number {profile.address_offset:+d}; both are in the table"
+
+
+def _limits(family: str, limits: Limits) -> Iterator[str]:
+    """What a device can do in one protocol family."""
+    if limits.frame is not None:
+        yield f"{family} longest frame: {limits.frame} octets"
+    if limits.response is not None:
+        yield f"{family} answers within: {limits.response / MS:g} ms"
+    if limits.responses:
+        by_rate = ", ".join(f"{rate} Bd {most / MS:g} ms" for rate, most in sorted(limits.responses.items()))
+        yield f"{family} answers within: {by_rate}"
+    if limits.stations is not None:
+        yield f"{family} station numbers: {limits.stations[0]} … {limits.stations[1]}"
+    if limits.functions is not None:
+        yield f"{family} functions: {' '.join(f'{code:02X}' for code in sorted(limits.functions))} (hex)"
+    if limits.unexecuted:
+        yield f"{family} acknowledges and does not do: {_told(limits.unexecuted)}"
+    if limits.read_only:
+        yield f"{family} attributes that are read only: {_told(limits.read_only)}"
 
 
 def _told(kinds: frozenset[str]) -> str:
