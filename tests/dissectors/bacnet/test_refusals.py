@@ -70,5 +70,6 @@ def test_what_to_do_next_follows_the_reason():
         refusals.refuse(9, Transaction(no, 9, READ, 2 * no, 2 * no + 1, Verdict.EXCEPTION, no, no, error=error), None)
     advice = {one.seen.split(" in answer")[0]: one.next for one in refusals.findings()}
     assert "ask for less" in advice["abort segmentation-not-supported"]
-    assert "load" in advice["abort tsm-timeout"] and "load" in advice["error device busy"]
+    assert "load" in advice["abort tsm-timeout"]
+    assert "load" in advice["error device busy"]
     assert "take what it has not out" in advice[f"error {UNKNOWN}"]
