@@ -7,6 +7,7 @@ from dataclasses import replace
 from math import floor, log10, sqrt
 
 from dissectors.findings import Finding, Severity
+from dissectors.frame import Flaw
 from dissectors.modbus.station_record import Key
 
 
@@ -57,4 +58,16 @@ def of_few(finding: Finding) -> Finding:
         means="noise on this station's drop, or anywhere on the line: too few to tell which",
         next="whether it comes again, and with whom; then that station's connector and stub, or termination, bias and "
         "ground",
+    )
+
+
+def without_check(finding: Finding, flaw: Flaw) -> Finding:
+    """What is found of a sender whose frames lack the check, and nothing else: perhaps it makes none."""
+    if flaw is not Flaw.LAST_TWO_MISSING:
+        return finding
+    return replace(
+        finding,
+        means="whoever sends makes no check, as a program does that leaves it to another; or its driver is released "
+        "before the check is out",
+        next="whether that program has to append the CRC itself; else its turnaround, its direction control",
     )

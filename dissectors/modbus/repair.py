@@ -8,6 +8,7 @@ that are good but for it. Put it right, and see whether the check agrees:
     last octet missing/spoilt   8 bits of the check are left: the length must be right, too, and the octets must answer
                                 the open request, or be a request that was made before
     last two octets missing     none is left: the same, and nothing but the check may be missing
+                                (where nobody was ever heard well: a request that is well formed)
 
 What merely could be put right is not told. By chance one damaged frame in 65536 would have one of the first three
 flaws; but one in 256 with a wrong check seems to have only its last octet spoilt, and any frame that lost two octets
@@ -48,7 +49,7 @@ def repaired(octets: bytes, expected: Expected | None, past: Past, heard: Set[in
     repair = (
         _swapped(octets, expected, heard)
         or _without_first(octets, expected, heard)
-        or _without_last(octets, expected, past)
+        or _without_last(octets, expected, past, heard)
         or _last_spoilt(octets, expected, past)
     )
     if repair is None or repair.flaw not in _BY_HABIT or past.has_asked(repair.octets):
@@ -85,7 +86,7 @@ def _without_first(octets: bytes, expected: Expected | None, heard: Set[int]) ->
     return None
 
 
-def _without_last(octets: bytes, expected: Expected | None, past: Past) -> Repair | None:
+def _without_last(octets: bytes, expected: Expected | None, past: Past, heard: Set[int]) -> Repair | None:
     for flaw, body, check in (
         (Flaw.LAST_MISSING, octets[:-1], octets[-1:]),
         (Flaw.LAST_TWO_MISSING, octets, b""),
@@ -95,6 +96,8 @@ def _without_last(octets: bytes, expected: Expected | None, past: Past) -> Repai
         whole = _sealed(body)
         if whole[len(body) : len(body) + len(check)] != check:
             continue
+        if _may_be_first(whole, heard):
+            return Repair(flaw, whole)
         if _is_proved(whole, expected, past) and (check or _says_its_length(whole, expected, past)):
             return Repair(flaw, whole)
     return None

@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times, together
+from dissectors.frame import Flaw
 from dissectors.late_speakers import MASTER
 from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.damage_shares import DamageShare, shares_of_damage, to_blame
-from dissectors.modbus.finding_words import note_if, of_few, request_words, units
+from dissectors.modbus.finding_words import note_if, of_few, request_words, units, without_check
 from dissectors.modbus.functions import BROADCAST, MAX_UNIT
 from dissectors.modbus.odd_ends import OddEnd
 from dissectors.modbus.rules import RULES
@@ -30,6 +31,7 @@ _ODD_LEAST = 3
 _MASTERS_LEAST = 3
 _CUT_LEAST = 3
 _COMMON_LEAST = 3
+_CUT = (Flaw.LAST_MISSING, Flaw.LAST_TWO_MISSING)
 
 
 def judge(seen: BusRecord, timeout: int | None) -> tuple[Finding, ...]:
@@ -201,9 +203,14 @@ def _of_requests(seen: BusRecord) -> Iterator[Finding]:
         if tally.count >= _CUT_LEAST and of * tally.count >= damaged and not is_chance:
             words = f"{counted(tally.count, 'request')} good but for one thing: {flaw.value}"
             severity = note_if(seen.rare(tally.count, seen.requests))
-            if tally.count == seen.requests:
-                words, severity = f"{words}, every time", Severity.ERROR  # no station can answer
-            yield tally.found(RULES[FLAWS[flaw]], "master", words, severity)
+            # where not one is good no station can answer; writes that lack their end are not put right
+            is_cut = flaw in _CUT and damaged >= seen.requests and 4 * tally.count >= 3 * damaged
+            is_always = is_cut or tally.count == seen.requests
+            if is_always:
+                words += ", every time" if tally.count == seen.requests else f", of {damaged}; not one is good"
+                severity = Severity.ERROR
+            flawed = tally.found(RULES[FLAWS[flaw]], "master", words, severity)
+            yield without_check(flawed, flaw) if is_always else flawed
     habit = seen.miscounted_requests
     if habit is not None:
         is_in_vain = not any(station.asked for station in seen.stations.values())  # not one request is good

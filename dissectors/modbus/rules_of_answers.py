@@ -65,12 +65,13 @@ ANSWER_RULES = (
     Rule(
         "MB006",
         Severity.WARNING,
-        "last octet of answers damaged",
-        "At least three answers of a station that are right but for their last octet, or end one octet early, and they "
-        "are most of its damaged answers. In RTU the low octet of the CRC is right and the high one wrong.",
-        "the station releases its driver before the last octet is out",
+        "last octet damaged",
+        "At least three frames of one sender that are right but for their last octet, or end one or two octets early, "
+        "and they are most of its damaged ones. In RTU the low octet of the CRC is right and the high one wrong. An "
+        "error where all requests are so, since no station can answer.",
+        "whoever sends releases its driver before the last octet is out",
         "its turnaround or transmit-delay setting; with a converter, the timer that switches direction",
-        explains=("MB002", "MB005", "MB007", "MB104"),
+        explains=("MB001", "MB002", "MB005", "MB007", "MB009", "MB104"),
     ),
     Rule(
         "MB007",

@@ -12,7 +12,7 @@ from dissectors.late_speakers import reaching
 from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.exception_meanings import EXCEPTIONS, MAKER_EXCEPTION, USED_ALIKE, VENDOR_EXCEPTION
-from dissectors.modbus.finding_words import note_if, of_few, request_words, share_words
+from dissectors.modbus.finding_words import note_if, of_few, request_words, share_words, without_check
 from dissectors.modbus.functions import EXCEPTIONS as EXCEPTION_NAMES
 from dissectors.modbus.header import code_number
 from dissectors.modbus.response_groups import AnsweredRequest
@@ -242,7 +242,10 @@ def _flawed(seen: BusRecord, name: str, station: StationRecord) -> Iterator[Find
         words = f"{count} of {counted(station.asked, 'answer')} good but for one thing: {flaw.value}"
         if count == station.damaged.count == station.asked:
             words += ", every time"
-        yield replace(tally.found(RULES[code], name, words, note_if(seen.rare(count, station.asked))), count=count)
+        flawed = replace(tally.found(RULES[code], name, words, note_if(seen.rare(count, station.asked))), count=count)
+        # the first of a habit is not put right
+        is_always = count >= station.damaged.count - 1 and station.damaged.count == station.asked
+        yield without_check(flawed, flaw) if is_always else flawed
 
 
 def _miscounted(name: str, station: StationRecord) -> Finding | None:

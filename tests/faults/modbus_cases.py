@@ -108,6 +108,22 @@ MODBUS_CASES: tuple[Case, ...] = (
         seeds=1,
     ),
     Case(
+        "RTU master makes no check",
+        partial(modbus, (Trimmed("master", last=2),), units=(1, 2), absent=(1, 2)),
+        (("MB006", "master"),),
+        never=("LN003",),
+        seconds=20,
+        seeds=1,
+    ),
+    Case(
+        "RTU requests end one octet early",
+        partial(modbus, (Trimmed("master", last=1),), units=(1, 2), absent=(1, 2)),
+        (("MB006", "master"),),
+        never=("LN003",),
+        seconds=20,
+        seeds=1,
+    ),
+    Case(
         "RTU first octet of one station lost",
         partial(modbus, (Trimmed("unit 2", first=1, rate=0.5),)),
         (Said(_second, words=_FIRST),),
