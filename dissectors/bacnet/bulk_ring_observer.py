@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from dissectors.bacnet.limits import T_USAGE_TIMEOUT
 from dissectors.bacnet.ring_observer import MstpRingObserver
 from dissectors.bacnet.ring_questions import AskedInRing
 
@@ -108,7 +109,9 @@ class BulkRingObserver(MstpRingObserver):
         self._holder, self._passed_by, self._token = int(columns.after[last]), None, None
         if columns.token[last]:
             self._passed_by, self._token, self._disturbed = source, frame, False
-        self._questions.asked = self._questions.late = None
+        self._questions.asked = self._questions.late = self._questions.found = None
+        if columns.poll_reply[last] and columns.gap[last] + columns.slack[last - 1] <= T_USAGE_TIMEOUT:
+            self._questions.found = source, destination
         if columns.asks[last]:
             kind = int(columns.kind[last])
             self._questions.asked = AskedInRing(kind, source, destination, frame, told.first + last)

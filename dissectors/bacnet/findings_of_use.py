@@ -19,6 +19,7 @@ POLLS_SHARE = 0.1
 LEAST_POLLS = 20
 SLOW_POLLS_LEAST = 5
 HASTY_LEAST = 3
+NOT_TAKEN_LEAST = 3
 
 SLOW_ROUND = 2 * NS_PER_S
 LEAST_ROUNDS = 20
@@ -113,6 +114,10 @@ def _waits(ring: Ring) -> Iterable[Remark]:
                 f"{measured(waited.most)}"
             )
             yield of("MS203", mac, seen, happened)
+        if what is RingEventKind.NOT_TAKEN:
+            who = f"MAC {listed(happened.parties)}"
+            seen = f"{times(happened.count)} {who} answered its poll in time, and it did not pass the token there"
+            yield of("MS205", mac, seen, happened, Severity.NOTE if happened.count < NOT_TAKEN_LEAST else None)
         if (
             what is RingEventKind.TOO_SOON
             and happened.count >= HASTY_LEAST

@@ -136,6 +136,8 @@ class RingColumns:
         soonest = np.zeros(len(self), np.int64)  # since a poll came alone, as `Questions` reckons
         soonest[2:] = self.start[2:] - self.end[:-2] + self.slack[:-2] - (self.end[1:-1] - self.start[1:-1])
         in_time &= ~(gone_on & ((surely > T_GO_ON) | (soonest < T_USAGE_DELAY // 2)))
+        taken = self.token[1:] & (self.destination[1:] == self.source[:-1])
+        in_time[1:] &= ~self.poll_reply[:-1] | taken
         began = self.series[:-1]  # before a table, or so long ago that it may say something
         in_time[1:] &= (
             ~_before(self.poll)[1:] | self.poll[1:] | ((began > 0) & (self.start[1:] - self.start[began] < T_STOPPED))

@@ -38,6 +38,7 @@ class RingEventKind(Enum):
     STORM = "one of many broadcasts in a short time"
     LATE_REPLY = "late to answer"
     NO_REPLY = "no answer"
+    NOT_TAKEN = "did not take the answer to its poll"
     LATE_POLL_REPLY = "late to answer a poll"
     ILLEGAL = "an address or length that the standard forbids"
     BROADCAST_REQUEST = "a broadcast that asks for a reply"

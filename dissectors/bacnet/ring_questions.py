@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from dissectors.bacnet import message as messages
 from dissectors.bacnet.frame_types import CARRIES_NPDU, EXPECTING, PROPRIETARY, FrameType
 from dissectors.bacnet.held_reads import HeldReads, surely_over
-from dissectors.bacnet.limits import MAX_MASTER, MS, T_NO_TOKEN, T_REPLY_DELAY, T_USAGE_DELAY
+from dissectors.bacnet.limits import MAX_MASTER, MS, T_NO_TOKEN, T_REPLY_DELAY, T_USAGE_DELAY, T_USAGE_TIMEOUT
 from dissectors.bacnet.message import data_of, more_follows
 from dissectors.bacnet.open_exchanges import POSTPONED_FOR
 from dissectors.bacnet.ring_events import RingEvent, RingEventKind
@@ -65,6 +65,7 @@ class RingQuestions:
 
     `doubt`: something may have been missed since the last good frame. `holder`: who has the token, as far as known.
     `late`: who sent the newest good frame, where that was an answer for which nobody waited any more.
+    `found`: who has just answered a poll in time, and whose.
     `alone_since`: the earliest that the frame before may have begun, None where it has no time of its own.
     """
 
@@ -74,6 +75,7 @@ class RingQuestions:
         self.holder: int | None = None
         self.late: int | None = None
         self.alone_since: int | None = None
+        self.found: tuple[int, int] | None = None
         self._tally = tally
         self._reads = reads
         self._unheard = unheard
@@ -87,18 +89,29 @@ class RingQuestions:
 
     def forget(self) -> None:
         """Octets were missed: nobody is measured against what was asked before."""
-        self.asked = self.late = None
+        self.asked = self.late = self.found = None
         self._unanswered.clear()
         self._postponed.clear()
 
     def is_answer(self, no: int, frame: Frame, frame_type: int, source: int, destination: int, node: NodeTally) -> bool:
         """Close what waits for an answer; say whether this frame of `node` is it, now or late."""
         asked, self.asked, self.late = self.asked, None, None
+        if self.found is not None:
+            self._see_found(self.found, no, frame, frame_type, source, destination)
         if asked is not None and self._answers(asked, no, frame, frame_type, source, destination, node):
             return True
         if not self._unanswered or source == self.holder or frame_type not in CARRIES_NPDU:
             return False
         return self._is_late(no, frame, source, destination)
+
+    def _see_found(
+        self, found: tuple[int, int], no: int, frame: Frame, frame_type: int, source: int, destination: int
+    ) -> None:
+        """Whoever answered a poll in time gets the token at once, if the one that polled heard it."""
+        replier, poller = found
+        self.found = None
+        if source == poller and not self.doubt and (frame_type != FrameType.TOKEN or destination != replier):
+            self._tally.note(RingEventKind.NOT_TAKEN, frame.start, no, poller, replier)
 
     def awaits(self, source: int) -> bool:
         """Whether it is the turn of `source`, which was asked."""
@@ -159,6 +172,8 @@ class RingQuestions:
                 self._unanswered_poll(asked, no, frame, source)
                 return False
             node.poll_reply.add(took)
+            if took + asked.frame.slack <= T_USAGE_TIMEOUT:
+                self.found = source, destination
             if self._reads.is_late(frame, asked.frame, T_USAGE_DELAY):
                 self._reads.add(RingEvent(RingEventKind.LATE_POLL_REPLY, frame.start, no, source, destination, took))
             return True

@@ -5,6 +5,8 @@ MS4 octets and frames, MS5 addresses, MS6 who uses the line, MS7 content (`conte
 from __future__ import annotations
 
 from dissectors.bacnet.content_findings import CONTENT_RULES
+from dissectors.bacnet.findings_of_routers import ROUTER_RULES
+from dissectors.bacnet.rules_of_polls import POLL_RULES
 from dissectors.findings import Rule, Severity
 
 _WIRING = "termination and bias at both ends, the shield, and the line's length and stubs"
@@ -135,47 +137,7 @@ _ALL = (
         "the slave's settings (unsolicited I-Am, COV), or make it a master",
         explains=("MS101", "MS102", "MS401", "MS402", "MS403", "LN101", "LN103", "LN2"),
     ),
-    Rule(
-        "MS201",
-        Severity.WARNING,
-        "too many polls for masters",
-        "A station polls for a new master once in 50 tokens (Npoll); more than one in 10 is counted here, "
-        "with the share of time that unanswered polls take. Polls of a search for a successor, the first one or a lost "
-        "one, do not count; what is no good frame may have been a token, and counts as one. Where half of all masters "
-        "do so, and two at least, it is one finding about the bus, and theirs are noted under it. But searches after a "
-        "loss that stopped the bus for over a second are said, with their cost, and so are polls of many addresses "
-        "with one token where nobody was lost.",
-        "a station that does not count to Npoll, or polls far beyond the last address",
-        "Max_Master and firmware of the stations named; gaps in the addresses",
-    ),
-    Rule(
-        "MS202",
-        Severity.WARNING,
-        "slow to answer a poll",
-        "A Reply To Poll For Master came later than 15 ms (Tusage_delay) after the poll. A single one is only noted.",
-        "the station risks not being taken into the ring",
-        "load and firmware of the station",
-    ),
-    Rule(
-        "MS203",
-        Severity.WARNING,
-        "slow between polls",
-        "Half of the polls for masters that nobody answers, and five at least, are followed by the station's "
-        "next frame "
-        "only after more than 100 ms; 20 … 35 ms (Tusage_timeout) are usual.",
-        "an overloaded station or a wrong time in its program: a search for a master takes minutes, and it may "
-        "hold the "
-        "token for as long",
-        "firmware, load and settings of the station",
-    ),
-    Rule(
-        "MS204",
-        Severity.WARNING,
-        "does not wait for the answer to a poll",
-        "A station sent again sooner than the one that it polled could have answered (8 ms), three times and more.",
-        "a wrong time in its program: it finds no other station",
-        "firmware and settings of the station (Tusage_timeout is 20 … 35 ms)",
-    ),
+    *POLL_RULES,
     Rule(
         "MS301",
         Severity.WARNING,
@@ -264,6 +226,7 @@ _ALL = (
             *("LN101", "LN103", "LN2", "LN305"),
         ),
     ),
+    *ROUTER_RULES,
     Rule(
         "MS401",
         Severity.WARNING,

@@ -151,6 +151,15 @@ def impatient() -> list[Step]:
     return steps
 
 
+def not_taken_in() -> list[Step]:
+    """33 answers the polls of 25 at once, which passes its token to 8 all the same; and a router does not know 5."""
+    steps: list[Step] = []
+    for _ in range(4):
+        steps += [*rounds(3, 8, 25), (2, token(8, 25)), (2, poll(25, 33)), (3, found(33, 25)), (2, token(25, 8))]
+        steps += [(2, token(8, 25)), (2, data(25, 8, "018003010005")), (2, token(25, 8))]
+    return steps + rounds(3, 8, 25)
+
+
 def polls_on() -> list[Step]:
     """8 polls one address after another with one token, though 25 has its token each time."""
     steps: list[Step] = []
@@ -313,6 +322,7 @@ MADE = {
     "ms-tp-number-is-taken": number_is_taken,
     "ms-tp-slow-between-polls": slow_polls,
     "ms-tp-does-not-wait-for-answers-to-polls": impatient,
+    "ms-tp-answers-to-polls-not-taken": not_taken_in,
     "ms-tp-polls-on-with-one-token": polls_on,
     "ms-tp-broadcast-storm": storm,
     "ms-tp-one-uses-most-of-the-line": one_hog,
