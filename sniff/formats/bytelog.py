@@ -22,7 +22,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from heapq import merge
-from itertools import islice, zip_longest
+from itertools import chain, islice, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -40,6 +40,7 @@ from sniff.formats.log_margin import plain_signs
 from sniff.formats.log_pieces import lines_in, rows_in
 from sniff.formats.log_plan import LOOKED_AT, LOOKED_AT_CHARACTERS, Plan, plan_of
 from sniff.formats.log_shapes import DECODED, REMARK
+from sniff.formats.log_untimed import unknown_by
 from sniff.formats.octet_table import TableLayout
 from sniff.formats.records import foreign_session
 from sniff.formats.set_back_clock import in_order
@@ -177,10 +178,21 @@ class ByteLog:
             order.add(stamp.time)
         if order.falls >= _FALLS_LEAST and order.is_newest_first and any(one.dated or one.daily for one in stamps):
             raise CaptureError(f"{self.path}: its times go back from line to line: newest first; turn it (`tac`)")
-        if not stamps:
+        unknown = unknown_by(self._told(lines))
+        if not stamps or unknown is None:
             longest = LINE_END + max((len(line.octets) for line in read), default=0) * SLOW.char
             return replace(adapter, latency=max(TIMELESS, longest), latency_from=NO_TIMES)
+        if unknown > adapter.latency:
+            return replace(adapter, latency=unknown, latency_from="lines without a time, between others that have one")
         return _as_coarse(adapter, min(stamp.tick for stamp in stamps))
+
+    def _told(self, lines: list[str]) -> list[tuple[int, bool]]:
+        """When each of the first reads came, and whether the log says so."""
+        assert self._plan is not None
+        assembly = Assembly(self._plan, self.session.line)
+        lines = list(self._plan.margin.joined(lines))
+        taken = chain.from_iterable(assembly.take(self._plan.line(text), text) for text in lines)
+        return [(item.time, assembly.has_time) for item in chain(taken, assembly.close()) if isinstance(item, Chunk)]
 
     def _lines(self, split: Callable[[Iterator[str]], Iterator[str]] = lines_in) -> Iterator[str]:
         with open_capture(self.path) as stream:

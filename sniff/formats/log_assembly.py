@@ -69,6 +69,7 @@ class Assembly:
         self._glued = False  # whether what is held follows what was given without a silence
         self._heading: Line | None = None
         self._used = False  # whether octets came below it
+        self._is_used_again = False  # whether its time, which is that of others, is all that is known
         self._expected = 0  # offset of the next row
         self._squeezed = False
         self._row = b""
@@ -81,6 +82,11 @@ class Assembly:
         self._message_last = "", b""  # the same of what was given last, and that
         self.completed = 0
         self.unwrapped = 0
+
+    @property
+    def has_time(self) -> bool:
+        """Whether the read given last had a time of its own."""
+        return self._placing.has_time
 
     def take(self, line: Line, text: str) -> Iterator[Item]:
         """Take a line; `text` as it is written."""
@@ -197,11 +203,11 @@ class Assembly:
         heading = self._heading
         self._held = bytearray(line.octets)
         self._samples = line.samples
-        self._stamp = line.stamp
+        self._stamp, self._is_used_again = line.stamp, False
         self._way = way
         if line.stamp is None and heading is not None and (line.bare or not self._used):
             self._stamp, self._way = heading.stamp, way or heading.way
-            self._used = True
+            self._is_used_again, self._used = self._used, True
 
     # -- rows of a hexdump -----------------------------------------------------------------------------------------
 
@@ -231,6 +237,7 @@ class Assembly:
             self._expected = offset
         if not self._held:
             stamp, glued = line.stamp, self._glued
+            self._is_used_again = stamp is None and self._used
             if stamp is None and self._heading is not None:
                 stamp, self._used = self._heading.stamp, True
             self._stamp, self._glued, self._samples = stamp, glued, None
@@ -292,6 +299,7 @@ class Assembly:
         follows = self._last + length + (silence if self._any else 0)
         time = follows
         is_told = not self._plan.timed
+        has_time = (self._stamp is not None and not self._is_used_again) or self._samples is not None
         if self._samples is not None and self._plan.bit_samples:
             ended = (self._samples[1] + self._plan.bit_samples) / self._plan.bit_samples * self._bit
             time, is_told = max(self._last, length, int(ended)) if ended < MOST else follows, True
@@ -327,7 +335,7 @@ class Assembly:
             self._clocked = True
         self._last, self._any = time, True
         chunk = Chunk(time, octets)
-        yield from self._placing.told(chunk, self._char) if is_told else self._placing.untold(chunk)
+        yield from self._placing.told(chunk, has_time, self._char) if is_told else self._placing.untold(chunk, has_time)
 
     def _was_told(self, octets: bytes) -> bool:
         """Whether a message that was completed is the one before, which the tool heard and now tells otherwise."""
