@@ -17,6 +17,7 @@ from textual import events
 from textual.css import stylesheet
 from textual.css.model import RuleSet
 from textual.keys import _character_to_key, key_to_character
+from textual.screen import Screen
 
 from dissectors.frame import Check, Damage, FoundBy, Frame, Header, LineError, Mark, Noise, Place, Reason, Role
 from dissectors.line import LineSettings
@@ -42,6 +43,16 @@ def _parsed_once(scope: str, css: str, read_from: Any, variable_tokens: Any, **m
 
 
 stylesheet.parse = _parsed_once  # type: ignore[assignment]
+
+_draw = Screen._compositor_refresh
+
+
+def _drawn_when_settled(screen: Screen) -> None:
+    """What stands on a screen between a key and its last consequence nobody sees here, and how often it would be drawn
+    meanwhile depends on what else the machine does: `Looking.settle` draws it."""
+
+
+Screen._compositor_refresh = _drawn_when_settled  # type: ignore[method-assign]
 
 MS = 1_000_000
 START = 1_772_359_200_000_000_000  # 2026-03-01T10:00:00Z
@@ -237,6 +248,7 @@ class Looking:
             if idle and not self._waits_for_layout():
                 break
         await self.pilot.pause(0)
+        _draw(self.app.screen)
 
     def _waits_for_layout(self) -> bool:
         """Whether a widget has other content whose place on the screen is not worked out yet."""
