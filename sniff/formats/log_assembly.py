@@ -197,6 +197,8 @@ class Assembly:
             return line.stamp is None and line.way == self._way
         if not line.bare or line.stamp is not None:
             return False
+        if self._plan.width is None and ends_with_crc16(bytes(self._held)):
+            return False  # a message that is whole
         return self._heading is not None or self._plan.width is not None or bool(self._way) or self._plan.directed
 
     def _begin(self, line: Line, way: str) -> None:

@@ -16,7 +16,8 @@ from sniff.formats.table_cells import MOST, UNITS, seconds
 
 _TIME = (
     r"(?:(?P<ahead>[AaPp]\.?[Mm]\.?|上午|下午|오전|오후) ?)?"
-    r"(?P<clock>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9}(?!\d|[A-Fa-f](?![Mm]\b))|:\d{3}(?![\d:]))?)"  # ,01CB are octets
+    r"(?P<clock>\d{1,2}:\d{2}:\d{2}"
+    r"(?:[.,]\d{1,9}(?!\d|[A-Fa-f](?![Mm]\b)|(?<=,\d\d)\.\d|(?<=,\d)\.\d)|:\d{3}(?![\d:]))?)"  # not ,01CB or ,21.5
     r"(?!\d|:[0-9A-Za-z])(?:[ \u00a0\u202f]?(?P<half>[AaPp](?:[Mm]\b|\. ?[Mm]\.)))?"
 )
 _MONTHS = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]

@@ -11,6 +11,7 @@ from functools import lru_cache
 from dissectors.checksums import ends_with_crc16
 from dissectors.quick_values import quickly_made
 from sniff.formats.log_clock import Stamp, stamp_of
+from sniff.formats.log_groups import groups_in, unpadded_in
 from sniff.formats.log_octets import PAIRS_ONLY, Run, number_in, numbers_in, octets_in, whole_in
 from sniff.formats.log_pieces import LONGEST, SPACES
 from sniff.formats.log_shapes import COLOURS, REMARK, STAMP, WAYS, Role, shape_of
@@ -126,9 +127,11 @@ def _taken_apart(text: str, base: int, rows: bool, times: Times, least: int) -> 
     if shape.role not in _TELLING:
         return Line(Kind.SHAPE, stamp, way, role=shape.role, tool=shape.tool, whole=shape.whole)
     told = groups.get("octets")
-    run = octets_in(text if told is None else told, base)
+    run = octets_in(text if told is None else told, base if shape.base is None else shape.base)
     if told is not None and run is None and _OCTET.fullmatch(told):
         run = Run(0, 1, bytes((int(told, 16),)), "one octet")
+    if told is not None and run is None and shape.base is not None and (one := number_in(told.strip("[] "))):
+        run = Run(0, 1, bytes((int(one, shape.base) & 0xFF,)), "one octet")
     if run is None:
         return Line(Kind.STRANGE, stamp, tool=shape.tool)
     begin, end = groups.get("begin"), groups.get("end")
@@ -173,8 +176,9 @@ _NUMERAL = re.compile(r"[0-9A-Fa-f]*\d[0-9A-Fa-f]*")
 
 def _general(text: str, stamp: Stamp | None, base: int, least: int) -> Line:
     run = octets_in(text, base, least)
-    if run is not None and base == PAIRS_ONLY:
-        run = whole_in(text, run)
+    if base == PAIRS_ONLY:
+        run = whole_in(text, run) if run is not None else None
+        run = unpadded_in(text, groups_in(text, run))
     if run is None:
         kind = Kind.STRANGE if _looks(text) else Kind.TEXT
         return Line(kind, stamp, way_of(text) if kind is Kind.TEXT else "")
@@ -267,9 +271,13 @@ def _looks(text: str) -> bool:
     ):
         return True
     joined = _JOINED.search(text)  # digits without space, of which a few are none
+    if joined is not None and joined[1][:2] in ("0x", "0X") and len(joined[1]) < _ADDRESS:
+        return False
     return joined is not None and sum(sign in _HEX for sign in joined[1]) >= 0.8 * len(joined[1])
 
 
+_ADDRESS = 12
+"""0x and digits that are no longer an address of a machine of 32 bits."""
 _HEX = frozenset("0123456789ABCDEFabcdef")
 _JOINED = re.compile(r"(?:^|[\s:>=\]])(?=[0-9A-Za-z?]*[0-9A-Fa-f]{4})(?=(?:[A-Za-z?]*\d){4})([0-9A-Za-z?]{10,})\s*$")
 

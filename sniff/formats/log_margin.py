@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from itertools import pairwise
 
+from dissectors.checksums import ends_with_crc16
 from sniff.formats.log_times import LEAST, is_count
 from sniff.formats.log_writing import USUAL, Writing, joined_lists, writing_of
 
@@ -178,6 +179,9 @@ def _have_counts(lines: Sequence[str], before: bool) -> bool:
     return len(found) >= LEAST and len(found) >= _MOST * len(runs)
 
 
+_PAIR = re.compile("[0-9A-Fa-f]{2}")
+
+
 def _counted(text: str) -> tuple[int, int, bool] | None:
     """Where the number of the octets of a line stands, and whether before them."""
     match = _RUN.search(text)
@@ -185,9 +189,18 @@ def _counted(text: str) -> tuple[int, int, bool] | None:
         return None
     octets = (len(match["run"]) + 1) // 3
     for begin, end, said, before, there in _candidates(match, octets):
-        if said is not None and int(said) == there:
+        if said is not None and int(said) == there and not _is_octet(match, said):
             return begin, end, before
     return None
+
+
+def _is_octet(match: re.Match[str], said: str) -> bool:
+    """Whether a number beside octets is one of theirs, by the check that they have with it: station 7, and the other
+    seven octets of its request."""
+    if len(said) != 2:
+        return False
+    pairs = [one for one in (match["ahead"], *_PAIR.findall(match["run"]), match["behind"]) if len(one or "") == 2]
+    return ends_with_crc16(bytes.fromhex("".join(pairs)))
 
 
 def _candidates(match: re.Match[str], octets: int) -> list[tuple[int, int, str | None, bool, int]]:

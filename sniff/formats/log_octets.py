@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, replace
 
 from dissectors.checksums import ends_with_crc16
-from sniff.formats.log_shapes import WAYS
+from sniff.formats.log_shapes import STAMP, WAYS
 from sniff.formats.log_spellings import H2, SPELLINGS, SURELY
 
 PAIRS_ONLY = 0
@@ -302,13 +302,17 @@ def _enough(line: str, begin: int, end: int) -> int:
         return 8
     if not alone:
         return 12
-    return 8 if before in (" ", "\t", "|", ";") else 4 if before in "#:=" else 12
+    return 4 if before in ("", "#") else 8 if before in (" ", "\t", "|", ";", ":", "=") else 12
 
 
 _BEHIND_ONE = r"\s*(?:\(\S{1,6}\)|\([A-Za-z][\w .,:/-]{0,40}\)|'.'|\".\"|[|;].*)?\s*"
 _ALONE = re.compile(rf"(?:^|.*[\s:<>\]|#,-])(?P<octet>(?:0[xX])?{H2}){_BEHIND_ONE}")
 _ALONE_SAID = re.compile(rf"(?:^|.*[\s:<>\]|#,-])(?P<octet>0[xX]{H2}){_BEHIND_ONE}")
 _ALONE_UNPADDED = re.compile(rf"(?:^|.*[\s:<>\]|#,=-])(?P<octet>[0-9A-Fa-f]{{1,3}}){_BEHIND_ONE}")
+
+
+_VALUE_AHEAD = re.compile(r"\d[.,]\d{1,6}[ ]?[,;\t][ ]?$")
+_SAID_AGAIN = re.compile(r"\(0[xX]([0-9A-Fa-f]{1,8})\)")
 
 
 def _single(line: str, base: int) -> Run | None:
@@ -319,9 +323,15 @@ def _single(line: str, base: int) -> Run | None:
     if match is None:
         return None
     try:
-        octet = bytes((int(match["octet"], base or 16),))
+        number = int(match["octet"], base or 16)
+        octet = bytes((number,))
     except ValueError:
         return None
+    if STAMP in line and _VALUE_AHEAD.search(line, 0, match.start("octet")) is not None:
+        return None  # of a table of values
+    beside = _SAID_AGAIN.search(line, match.end("octet"))
+    if beside is not None and int(beside[1], 16) not in (number, int(match["octet"].lower().removeprefix("0x"), 16)):
+        return None  # the number of a register, and what it holds
     return Run(match.start("octet"), match.end("octet"), octet, "one octet")
 
 

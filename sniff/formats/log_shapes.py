@@ -45,7 +45,9 @@ class Shape:
     pattern: re.Pattern[str]
     role: Role = Role.DATA
     whole: Callable[[bytes], bytes] | None = None
-    """Octets that the tool tells without their check → as they were sent."""
+    """Octets that the tool tells without their check → as they were sent; none, where they never were."""
+    base: int | None = None
+    """Of the numbers in `octets`, where only the tool tells."""
 
 
 _H = r"[0-9A-Fa-f]{1,2}"
@@ -53,8 +55,14 @@ _H2 = r"[0-9A-Fa-f]{2}"
 _S = r"\0"
 
 
-def _shape(tool: str, pattern: str, role: Role = Role.DATA, whole: Callable[[bytes], bytes] | None = None) -> Shape:
-    return Shape(tool, re.compile(pattern), role, whole)
+def _shape(
+    tool: str,
+    pattern: str,
+    role: Role = Role.DATA,
+    whole: Callable[[bytes], bytes] | None = None,
+    base: int | None = None,
+) -> Shape:
+    return Shape(tool, re.compile(pattern), role, whole, base)
 
 
 def _with_crc(octets: bytes) -> bytes:
@@ -65,12 +73,12 @@ def _with_crc(octets: bytes) -> bytes:
 
 
 _OWN_CODES = 0xE0
-"""eModbus: from here on codes of exceptions are its own, of answers that did not come."""
+"""eModbus: from here on codes of exceptions are its own, of answers that did not come; no station can send them."""
 
 
 def _of_emodbus(octets: bytes) -> bytes:
     """What eModbus hands on as an answer: nothing where it made it itself."""
-    is_own = len(octets) == 3 and octets[1] & 0x80 and octets[2] >= _OWN_CODES
+    is_own = len(octets) == 1 or (len(octets) == 3 and octets[1] & 0x80 and octets[2] >= _OWN_CODES)
     return b"" if is_own else _with_crc(octets)
 
 
@@ -114,7 +122,8 @@ SHAPES: tuple[Shape, ...] = (
     _shape("node-modbus-serial", r"\bdata: <Buffer (?P<octets>[0-9a-f ]+?)(?P<cut> \.\.\.[^>]*)?>"),
     _shape("node-modbus-serial", r"\bbuffer: <Buffer", Role.SAME),
     _shape("node-modbus-serial", r"<Buffer (?P<octets>[0-9a-f ]+?)(?P<cut> \.\.\.[^>]*)?>", Role.PERHAPS),
-    _shape("node-modbus-serial", r"\"type\":\s*\"Buffer\",\s*\"data\":\s*(?P<octets>\[[\d,\s]+\])"),
+    _shape("node-modbus-serial", r"\"type\":\s*\"Buffer\",\s*\"data\":\s*(?P<octets>\[[\d,\s]+\])", Role.PERHAPS,
+           base=10),
     _shape("QModMaster", rf"\[(?:RTU|ASCII|TCP)\]>\s*(?P<way>[TR]x)\s*>\s*{_S}\s*-"),
     _shape("QModMaster", r"^Sys\s*>", Role.NOTHING),
     _shape("Modbus Poll", r"(?P<way>[TR]x):\s?\d{4,9}-"),
@@ -146,8 +155,8 @@ SHAPES: tuple[Shape, ...] = (
 
 _OF_TSHARK = "the capture itself, or `tshark -x` of it"
 
-BUFFER = re.compile(r"\bProcessing:$")
-"""Labels of known tools (pymodbus) that tell what waits in a buffer: what came before, and what came to it."""
+BUFFER = re.compile(r"\bProcessing:$|~-handler buffer$")
+"""Labels of known tools (pymodbus, jsmodbus) that tell a buffer: what waits in it, and what came to that."""
 
 DECODED = (
     (re.compile(r"<pdml[ >]"), "PDML, which has decoded fields and no octets as they were sent", _OF_TSHARK),

@@ -188,3 +188,84 @@ def test_requests_of_register_0_are_no_headers_of_a_network(tmp_path: Path) -> N
     assert session.protocol == "modbus-rtu"
     rows = [item.row for item in settled(capture.items(), session)]
     assert [row.event.octets.hex(" ").upper() for row in rows] == [asked, answered] * 6
+
+
+def grouped(sign: str) -> str:
+    octets = CUT.split()
+    return sign.join("".join(octets[at : at + 2]) for at in range(0, len(octets), 2))
+
+
+@pytest.mark.parametrize("sign", [" | ", " - ", "  ", ", ", "; "])
+def test_octets_in_groups_are_all_read_without_a_check(sign: str, tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    path.write_text("".join(f"10:00:0{at}.100 TX: {A}\n10:00:0{at}.140 RX: {grouped(sign)}\n" for at in range(3)))
+    chunks = [item.octets.hex(" ").upper() for item in read(path).items() if isinstance(item, Chunk)]
+    assert chunks == [A, CUT] * 3
+
+
+def test_what_eModbus_says_of_itself_was_never_on_the_line(tmp_path: Path) -> None:
+    """A timeout is its own code, an answer with it is made up."""
+    path = tmp_path / "x.log"
+    path.write_text(
+        "[V] Data: @3FFB3944/1:\n  | 0000: E0                                                |.               |\n"
+        "[V] Response packet: @3FFB3944/3:\n  | 0000: 07 84 E0                                          |...             |\n"
+        "[D] Sent packet: @3FFB3944/6:\n  | 0000: 07 04 00 10 00 02                                 |......          |\n"
+        "[D] Raw buffer received: @3FFB39A0/2:\n  | 0000: 07 00                                             |..              |\n"
+        "[D] Received packet: @3FFB3944/1:\n  | 0000: E2                                                |.               |\n"
+    )
+    chunks = [item.octets.hex(" ").upper() for item in read(path).items() if isinstance(item, Chunk)]
+    assert chunks == [A, "07 00"]
+
+
+def test_decimal_buffers_beside_others_are_decimal(tmp_path: Path) -> None:
+    """modbus-serial prints what it logs twice: with `<Buffer …>`, and as JSON."""
+    path, log = tmp_path / "x.log", ""
+    for text in (A, R, A2, CUT):
+        numbers = ",".join(str(int(pair, 16)) for pair in text.split())
+        log += f"  modbus-serial {{ action: 'send serial',\n  modbus-serial   data: <Buffer {low(text)}>,\n"
+        log += f'  modbus-serial {{"action":"send serial","data":{{"type":"Buffer","data":[{numbers}]}},"unitid":7}} +15ms\n'
+    path.write_text(log)
+    chunks = [item.octets.hex(" ").upper() for item in read(path).items() if isinstance(item, Chunk)]
+    assert chunks == [A, R, A2, CUT]
+
+
+def test_a_message_in_other_digits_than_most(tmp_path: Path) -> None:
+    path = tmp_path / "x.txt"
+    unpadded = " ".join(f"{int(pair, 16):x}" for pair in R.split())
+    asked = "".join(f"[{1021 + 20 * at}ms] Received: {A}\n" for at in range(5))
+    path.write_text(f"It says\n{asked}\nand I answer with this:\n[1212ms] {unpadded} \n")
+    chunks = [item.octets.hex(" ").upper() for item in read(path).items() if isinstance(item, Chunk)]
+    assert chunks == [A] * 5 + [R]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "[12:02:42][V][Growatt:107]: Modbus received Byte  {0} (0X2FE{0})",
+        "2024-11-28 10:00:0{0},2{0}.5,4{0}",
+        "I (9{0}) boot: load:0x3fff0030,len:717{0}",
+        "usb 1-1: New USB device found, idVendor=0403, idProduct=600{0}",
+    ],
+)
+def test_values_and_lengths_are_no_octets(line: str, tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    path.write_text("".join(f"{line.format(number)}\n" for number in range(8)))
+    with pytest.raises(CaptureError, match="no byte log"):
+        read(path)
+
+
+def test_two_lines_of_octets_that_are_whole_are_two(tmp_path: Path) -> None:
+    path = tmp_path / "x.txt"
+    path.write_text(
+        f"The master sends: {A}\nand the slave replies to this:\n{R} (at first)\n{R2} (after a second time)\n"
+    )
+    chunks = [item.octets.hex(" ").upper() for item in read(path).items() if isinstance(item, Chunk)]
+    assert chunks == [A, R, R2]
+
+
+@pytest.mark.parametrize("between", [" ", ",", ";", "\t"])
+def test_station_7_is_not_the_number_of_the_octets_behind_it(between: str, tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    path.write_text("".join(f"10:00:0{at} {text.replace(' ', between)}\n" for at, text in enumerate([A, A2] * 4)))
+    octets = b"".join(item.octets for item in read(path).items() if isinstance(item, Chunk))
+    assert octets.hex(" ").upper() == " ".join([A, A2] * 4)
