@@ -214,7 +214,7 @@ SUFFIXES = (".mcap", ".pcap", ".pcapng", ".cap.txt")
 @pytest.mark.parametrize("strange", [0.0, 0.01, 0.3])
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_every_writable_format(tmp_path: Path, suffix: str, strange: float) -> None:
-    items = bus(900, 3, strange)
+    items = bus(300 if suffix == ".cap.txt" and strange == 0.3 else 900, 3, strange)  # long reads make a long text
     found = same_file(written(tmp_path / f"bus{suffix}", items))
     if suffix == ".mcap" and strange <= 0.01:
         assert found == told(items)

@@ -33,7 +33,7 @@ from sniff.filter.errors import FilterError
 from sniff.formats import read
 from tests.bench import bulk_ascii, bulk_mstp, bulk_n2, bulk_profibus, bulk_rtu
 from tests.property.test_judging_tables import MIXED, by_tables, judged, same
-from tests.seeds import IS_SEARCH, MOST_READS, some
+from tests.seeds import IS_SEARCH, MOST_READS, in_turn, some
 
 Bus = Callable[[float], tuple[Session, Reads]]
 
@@ -56,9 +56,9 @@ class Given:
     by_tables: list[Table | LineEvent]
 
 
-@pytest.fixture(scope="module", params=some(NAMES, 3), ids=lambda path: path.name)
+@pytest.fixture(scope="module", params=in_turn(some(NAMES, 3), 0, 2), ids=lambda path: path.name)
 def given(request: pytest.FixtureRequest) -> Given:
-    """A capture, read once for all that is asked of it."""
+    """A capture, read once for all that is asked of it. As many others are read live (`test_live_tables.py`)."""
     try:
         capture = read(request.param)
         items = list(islice(capture.items(), MOST_READS))

@@ -42,7 +42,7 @@ WORDS = (
 CUTS = ("--frames 3-9", "--from +0.2 --to +1.5")
 
 
-@pytest.mark.parametrize(("place", "words"), [*enumerate(WORDS)])
+@pytest.mark.parametrize(("place", "words"), [*enumerate(WORDS)], ids=WORDS)
 def test_the_same_is_said(place: int, words: str, sniff485: Callable[..., Any]) -> None:
     for path in in_turn(NAMES, place, 2):
         command = [str(path) if word == "FILE" else word for word in words.split()]
