@@ -354,11 +354,11 @@ def test_of_the_bulk_bus(timing: Timing) -> None:
 OURS = sorted((Path(__file__).parents[2] / "captures").rglob("*rtu*.cap.txt"))
 
 
-@pytest.mark.parametrize(("place", "path"), [*enumerate(OURS)], ids=[path.name for path in OURS])
-def test_of_our_captures(place: int, path: Path) -> None:
+@pytest.mark.parametrize("path", OURS, ids=lambda path: path.name)
+def test_of_our_captures(path: Path) -> None:
     capture = formats.read(path)
     chunks = [item for item in capture.items() if isinstance(item, Chunk)]
-    for latency in in_turn((0, FTDI_LATENCY), place, 2):
+    for latency in in_turn((0, FTDI_LATENCY), OURS.index(path), 2):
         assert_paired_equally(chunks, replace(capture.session.timing, latency=latency))
 
 

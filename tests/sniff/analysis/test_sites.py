@@ -26,6 +26,7 @@ from sniff.engine.blocks import Block, blocks_of
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Item, LineEvent, LineEventKind, gone
+from tests.seeds import seeds
 from tests.sniff.analysis.sites_made import BASE, SITES, Site, sessions, write
 
 CAPTURES = Path(__file__).parents[3] / "captures" / "sites"
@@ -60,7 +61,7 @@ def codes(findings: tuple[Finding, ...]) -> tuple[str, ...]:
 
 
 @pytest.mark.parametrize("name", SITES)
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", seeds(2))
 def test_what_is_between_the_buses_is_found_and_nothing_else(name: str, seed: int) -> None:
     make, expected = SITES[name]
     assert codes(judge(make(random.Random(seed))).findings) == expected

@@ -28,6 +28,7 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import observe, observe_tables
 from sniff.engine.session import Item, LineEvent
 from sniff.formats import read
+from tests.seeds import in_turn
 
 FOLDER = Path(__file__).parents[3] / "captures"
 CAPTURES = sorted([*FOLDER.glob("rtu-*.cap.txt"), *FOLDER.glob("mstp-*.cap.txt"), *FOLDER.glob("n2-*.cap.txt")])
@@ -54,7 +55,7 @@ def test_samples_and_points_of_tables_are_those_of_rows(path: Path) -> None:
             samples += reader.add(output)
     expected = PointTable()
     expected.add(samples)
-    for size in (1, 5, 100_000):
+    for size in in_turn((1, 5, 100_000), CAPTURES.index(path), 3):
         points, together = PointTable(), list(of_tables(path, size))
         assert [sample for some in together for sample in some.in_order()] == samples, size
         for some in together:

@@ -15,7 +15,7 @@ from sniff.engine.capture import CaptureError
 from sniff.engine.session import ASSUMED, LINE_NOTE, PROTOCOL_NOTE, Adapter, Session
 from sniff.formats import read, with_first_reads
 from sniff.formats.table import suffixes
-from tests.seeds import some
+from tests.seeds import in_turn, some
 
 HERE = Path(__file__).parents[3]
 FOLDERS = [HERE / "captures", *(HERE.parent / "shared" / name for name in ("captures", "cases"))]
@@ -33,7 +33,10 @@ def _files() -> list[Path]:
     )
 
 
-@pytest.mark.parametrize("path", some(_files(), 4), ids=lambda path: f"{path.parent.name}-{path.name}")
+FILES = some(_files(), 4)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}-{path.name}")
 def test_sure_is_right(path: Path) -> None:
     try:
         session = read(path).session
@@ -41,7 +44,7 @@ def test_sure_is_right(path: Path) -> None:
         pytest.skip("no capture that is read")
     if session.unknown or PROTOCOL_NOTE in session.notes:
         pytest.skip("its protocol is not known")
-    for notes in (NOTES, {PROTOCOL_NOTE: ASSUMED}):
+    for notes in in_turn((NOTES, {PROTOCOL_NOTE: ASSUMED}), FILES.index(path), 2):
         told = told_by(replace(session, notes=notes))
         if told.sureness is Sureness.SURE:
             assert told.reading is not None

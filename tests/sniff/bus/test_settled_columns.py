@@ -15,6 +15,7 @@ from sniff.engine.session import Item, LineEvent
 from sniff.engine.table import Table, rows_at
 from sniff.engine.verdict_join import JudgedRow
 from sniff.formats import read
+from tests.seeds import in_turn
 
 CAPTURES = sorted((Path(__file__).parents[3] / "captures").glob("*.cap.txt"))
 
@@ -34,7 +35,7 @@ def in_parts(path: Path, size: int) -> Iterator[Table]:
 def test_every_row_comes_once_with_its_transaction(path: Path) -> None:
     capture = read(path)
     expected = list(settled(capture.items(), capture.session))
-    for size in (1, 7, 100_000):
+    for size in in_turn((1, 7, 100_000), CAPTURES.index(path), 3):
         joining, joined = ColumnJoin(), list[JudgedRow]()
         for table in in_parts(path, size):
             joined += [some.item(place) for some in joining.add(table) for place in range(some.begin, some.end)]
