@@ -16,9 +16,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from math import log2
+from string import ascii_letters, digits
 from typing import Final
 
 from dissectors.findings import Tally
+from dissectors.modbus.functions import ITEMS_ASKED
+from dissectors.modbus.lengths import MIN_FRAME
 
 _FACTORS: Final = (8, 6, 5, 4, 3, 2)
 _STRETCHES_KEPT = 32
@@ -31,6 +34,10 @@ _LONG = 6  # octets
 _STRAY = 20  # one octet in so many may not fit: an edge that jitter moved
 _PRINTABLE: Final = frozenset(b"\r\n\t") | frozenset(range(0x20, 0x7F))
 _TEXT_BITS: Final = log2(256 / len(_PRINTABLE))  # that one of them is no chance
+_LETTERS: Final = frozenset(ascii_letters.encode() + digits.encode())
+_WORDY = 3  # of so many characters one is a letter or a digit
+_KEPT_LEAST = 12  # bits
+_CHANGED_LEAST = 3  # the same; fewer are noise on a copy
 _MIXED = 8  # octets of text with bit 7 as parity that have it set, and so many that have not
 
 
@@ -73,6 +80,8 @@ def text_of(stretches: Iterable[bytes]) -> tuple[str, str] | None:
     low = bytes(octet & 0x7F for octet in octets)
     if sum(octet in _PRINTABLE for octet in low) * _STRAY < (_STRAY - 1) * len(low):
         return None
+    if _WORDY * sum(octet in _LETTERS for octet in low) < len(low):
+        return None  # bits that ring are signs, too: @, space, `
     high = sum(octet > 0x7F for octet in octets)
     parity = ""
     if high * _STRAY > len(octets):
@@ -81,6 +90,33 @@ def text_of(stretches: Iterable[bytes]) -> tuple[str, str] | None:
             return None
         parity = "odd" if odd else "even"
     return bytes(octet & 0x7F for octet in each[-1]).decode("ascii"), parity
+
+
+def parity_of(stretches: Iterable[bytes]) -> str:
+    """The parity that all octets have as seven bits and a parity bit read as eight ("even", "odd"); "" where they have
+    none, or too few tell."""
+    octets = b"".join(stretches)
+    high = sum(octet > 0x7F for octet in octets)
+    if min(high, len(octets) - high) < _MIXED or len(octets) < _CERTAIN:
+        return ""
+    odd = sum(octet.bit_count() & 1 for octet in octets)
+    if min(odd, len(octets) - odd) * _STRAY > len(octets):
+        return ""
+    return "odd" if 2 * odd > len(octets) else "even"
+
+
+def is_bad_copy(request: bytes, octets: bytes) -> bool:
+    """Whether octets are a read given back in which several bits were read as 1 that were sent as 0, or the other way,
+    and none otherwise: chance keeps so many bits of another frame hardly ever. (What repeats a write is its answer.)"""
+    if len(octets) != len(request) or len(request) < MIN_FRAME or request[1] not in ITEMS_ASKED:
+        return False
+    sent, came = int.from_bytes(request, "big"), int.from_bytes(octets, "big")
+    if (sent ^ came).bit_count() < _CHANGED_LEAST:
+        return False
+    kept = (
+        sent.bit_count() if sent & came == sent else 8 * len(request) - sent.bit_count() if sent | came == sent else 0
+    )
+    return kept >= _KEPT_LEAST
 
 
 def _are_of_two_levels(stretches: Sequence[bytes]) -> bool:
@@ -98,12 +134,22 @@ class Garbage:
     stretches: deque[bytes] = field(default_factory=lambda: deque(maxlen=_STRETCHES_KEPT))
     marked: int = 0  # of them with line errors
     begun: int = 0  # of them that begin as the answer should
+    copied: int = 0  # of them the request, badly heard
     of_text: bool = False  # what should have come is text, too
     _counts: Counter[bytes] = field(default_factory=Counter)
 
-    def add(self, octets: bytes, time: int, *frames: int | None, is_marked: bool = False, begins: bool = False) -> None:
-        """Count one more; `is_marked`: with line errors; `begins`: as the answer should."""
+    def add(
+        self,
+        octets: bytes,
+        time: int,
+        *frames: int | None,
+        is_marked: bool = False,
+        begins: bool = False,
+        request: bytes = b"",
+    ) -> None:
+        """Count one more; `is_marked`: with line errors; `begins`: as the answer should; `request`: what was asked."""
         self.marked += is_marked
+        self.copied += is_bad_copy(request, octets)
         self.begun += begins
         self.tally.add(time, *frames)
         self.stretches.append(octets)
@@ -126,10 +172,19 @@ class Garbage:
         is_any = self.tally.count >= _LEAST and not self.of_text and 2 * self.begun <= self.tally.count
         return text_of(self.stretches) if is_any else None
 
+    def parity(self) -> str:
+        """See `parity_of`; "" where there is too little of it."""
+        return parity_of(self.stretches) if self.tally.count >= _LEAST and not self.of_text else ""
+
+    @property
+    def is_copy(self) -> bool:
+        """Whether nearly all of it is what was asked, badly heard."""
+        return self.copied >= _LEAST and 4 * self.copied >= 3 * self.tally.count
+
     @property
     def is_system(self) -> bool:
         """Whether the sender makes it so: always the same, in longer bits, or text; not what spoils octets."""
-        if self.slower_by() is not None or self.text() is not None:
+        if self.is_copy or self.slower_by() is not None or self.text() is not None or self.parity():
             return True
         broken_on_the_way = 2 * self.marked > self.tally.count and 2 * self.begun > self.tally.count
         return self.always() is not None and not broken_on_the_way

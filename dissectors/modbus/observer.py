@@ -284,7 +284,9 @@ class ModbusFindings(RequestObserver):
         station.garbage.of_text = asked.frame.protocol != RTU_NAME
         begins = stray[:1] == (b":" if station.garbage.of_text else asked.octets[:1])
         frames, marked = (transaction.request, transaction.response), transaction.id in self.marked
-        station.garbage.add(stray, transaction.end, *frames, is_marked=marked, begins=begins)
+        station.garbage.add(
+            stray, transaction.end, *frames, is_marked=marked, begins=begins, request=asked.frame.octets
+        )
         excess = excess_of(asked, stray)
         if excess is not None and self._outlasts(transaction, asked):
             station.outlasting.add(transaction.end, transaction.request, transaction.response)

@@ -17,12 +17,14 @@ from dissectors.modbus.damaged import (
     Side,
     classify_leftover,
     cut_echo_of,
+    levels_at_start,
     noise_place,
     noise_reason,
     predicted,
     zeros_at_start,
 )
 from dissectors.modbus.functions import ANSWER_LENGTHS, BROADCAST, EXCEPTION_BIT, is_open_length
+from dissectors.modbus.lengths import MIN_FRAME
 from dissectors.modbus.open_request import Expected, expectation
 from dissectors.modbus.past import Past
 from dissectors.modbus.repair import repaired
@@ -175,6 +177,9 @@ class RtuWindow:
                 if zeros == count:
                     return
                 before, stretch, count = Side.NOISE, stretch[zeros:], count - zeros
+        if level := self._level_before_answer(stretch, before):
+            self._take_noise(level, before, Side.FRAME, None)
+            stretch, count = stretch[level:], count - level
         heard = stretch[0] in self.units if self.units else None
         called = count > 1 and self.past.has_called(stretch[0], stretch[1] & ~EXCEPTION_BIT)
         hurt = classify_leftover(stretch, before, after, heard, called, self.expected)
@@ -190,6 +195,14 @@ class RtuWindow:
             self.take_frame(count, any(r.request for r in fits), any(r.response for r in fits))
         else:
             self._take_damaged(count, hurt, None)
+
+    def _level_before_answer(self, stretch: bytes, before: Side) -> int:
+        """How many octets FF or 00 stand before what begins as the awaited answer and is no good frame: a driver that
+        was switched on late spoils the answer neither way."""
+        awaited, level = self.expected, levels_at_start(stretch)
+        if awaited is None or before is Side.NOISE or not 0 < level <= len(stretch) - MIN_FRAME:
+            return 0
+        return level if stretch[0] != awaited.unit and awaited.is_for(stretch, level) else 0
 
     def _take_repaired(self, count: int, repair: Repair) -> None:
         """Give a damaged frame that is known all the same. A request of which all of the check agrees is open now."""

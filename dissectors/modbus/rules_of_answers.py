@@ -150,7 +150,8 @@ ANSWER_RULES = (
         Severity.ERROR,
         "answers in something else",
         "Octets in place of answers, at least three times and most of what came so: always the same ones, or such that "
-        "all runs of equal bits are multiples of 2 … 8, as a slower line looks when it is read too fast; or text. "
+        "all runs of equal bits are multiples of 2 … 8, as a slower line looks when it is read too fast; or text; or "
+        "octets of one parity, as 7 data bits and a parity bit. "
         "Noise is never the same twice, nor text, and neither are two stations that talk at once.",
         "the device has another baud rate, or speaks another protocol",
         "baud rate, parity and protocol in the device's settings",
@@ -207,10 +208,11 @@ ANSWER_RULES = (
         "request copied back",
         "Nine in ten requests to one station come back at once, and those to others never. Of the bus: nine in ten "
         "requests, to two stations or more, come a second time, always as long after the first, within 150 ms, never "
-        "a third, and are answered then: a relay, or a slow echo, that this tap hears beside the master.",
+        "a third, and are answered then: a relay, or a slow echo, that this tap hears beside the master. Of a station "
+        "also where most of what comes in place of its answers is the request with bits changed to one side.",
         "this station's driver hears itself, or its converter repeats what it hears, before the station answers",
         "how its driver and receiver are enabled; the converter in front of it",
-        explains=("MB002", "MB003", "MB004", "MB005", "MB020", "MB104", "MB301", "LN205"),
+        explains=("MB002", "MB003", "MB004", "MB005", "MB020", "MB104", "MB301", "LN204", "LN205"),
     ),
     Rule(
         "MB019",

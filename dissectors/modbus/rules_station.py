@@ -17,6 +17,7 @@ from dissectors.modbus.functions import EXCEPTIONS as EXCEPTION_NAMES
 from dissectors.modbus.header import code_number
 from dissectors.modbus.response_groups import AnsweredRequest
 from dissectors.modbus.rules import RULES
+from dissectors.modbus.rules_foreign import foreign_answers
 from dissectors.modbus.station_record import STRAY, Key, Requested, StationRecord
 from dissectors.modbus.struck_octet import falls_there_by_chance
 from dissectors.modbus.talked_over import second_voice
@@ -46,10 +47,8 @@ _NOT_THERE = (1, 2, 3)  # exceptions that tell a program that tries what a devic
 _PROBED = 8  # times that something else is asked for each try
 _NEARLY_ALL_LEAST = 10  # damaged answers
 _GARBLED_LEAST = 5  # damaged answers that are no frame at all
-_TEXT_SHOWN = 24
 _SYSTEM_LEAST = 3  # of one kind, before it is a system
 _SECOND_RARE = 10  # answers for each second one, where these are rare
-_HEX_SHOWN = 16
 _REPEATS_COST = 0.02
 _REPEATS_LEAST = 3  # fewer are no habit, however short the capture
 
@@ -58,7 +57,7 @@ def of_station(
     seen: BusRecord, unit: int, station: StationRecord, timeout: int | None, is_common: bool
 ) -> Iterator[Finding]:
     name = f"station {unit}"
-    foreign = _foreign(seen, name, station)
+    foreign = foreign_answers(seen, name, station)
     miscounted = None if foreign else _miscounted(name, station)
     systematic = [*_flawed(seen, name, station), *(one for one in (foreign, miscounted) if one)]
     yield from systematic
@@ -260,42 +259,6 @@ def wrongly_checked(name: str, habit: Habit, of: str, severity: Severity | None 
     """What a sender does with its checks. `of`: how many frames of its kind there were, in words."""
     finding = habit.tally.found(RULES["MB021"], name, f"{habit.count} of {of} {habit.told('check')}", severity)
     return replace(finding, count=habit.count, means=habit.mistake.means or finding.means)
-
-
-def _foreign(seen: BusRecord, name: str, station: StationRecord) -> Finding | None:
-    """Octets in place of answers that are always the same, or those of another baud rate."""
-    garbage = station.garbage
-    same, factor = garbage.always(), garbage.slower_by()
-    if not garbage.is_system or 2 * garbage.tally.count < station.damaged.count:
-        return None
-    if same is not None and 2 * garbage.begun > garbage.tally.count:
-        words = f"{counted(garbage.tally.count, 'damaged answer')}, always the same {_octets(len(same))}: {_hex(same)}"
-        return garbage.tally.found(RULES["MB015"], name, words)
-    text = garbage.text()
-    if factor is None and text is None and station.answered > garbage.tally.count:
-        return None  # it speaks as this line does; what falls on its answers always begins so late
-    words = f"{times(garbage.tally.count)} something that is not this protocol came in answer"
-    if same is not None:
-        words += f", always the same {_octets(len(same))}: {_hex(same)}"
-    if factor is not None:
-        baud = seen.timing.line.baud
-        rates = f": about {baud // factor} Bd, not {baud}" if seen.timing.has_rate else ", whose baud rate nobody said"
-        words += f"; its bits are {factor} times as long as those of this line{rates}"
-    elif text is not None:
-        words += f"; it is text{f' with 7 data bits and {text[1]} parity' if text[1] else ''}: {_quoted(text[0])}"
-    return garbage.tally.found(RULES["MB014"], name, words)
-
-
-def _quoted(text: str) -> str:
-    return ascii(text[:_TEXT_SHOWN])[1:-1].join("“”") + (" …" if len(text) > _TEXT_SHOWN else "")
-
-
-def _octets(count: int) -> str:
-    return counted(count, "octet")
-
-
-def _hex(octets: bytes) -> str:
-    return octets[:_HEX_SHOWN].hex(" ").upper() + (" …" if len(octets) > _HEX_SHOWN else "")
 
 
 def _exceptions(seen: BusRecord, name: str, unit: int, station: StationRecord) -> Iterator[Finding]:
