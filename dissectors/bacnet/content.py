@@ -18,6 +18,7 @@ from typing import Any
 from dissectors.bacnet import codec, services
 from dissectors.bacnet import message as messages
 from dissectors.bacnet import npdu as npdus
+from dissectors.bacnet import tags as tagging
 from dissectors.bacnet.apdu import Apdu, PduType
 from dissectors.bacnet.dates import Date, Time
 from dissectors.bacnet.frame_types import EXPECTING
@@ -25,7 +26,7 @@ from dissectors.bacnet.limits import BROADCAST
 from dissectors.bacnet.message import Message
 from dissectors.bacnet.npdu import Npdu
 from dissectors.bacnet.tags import Tag
-from dissectors.bacnet.values import APPLICATION, ConstructedValue, primitive
+from dissectors.bacnet.values import APPLICATION, NUMBER_OF, ConstructedValue, is_misnamed, primitive, text
 from dissectors.frame import Frame
 
 
@@ -123,7 +124,22 @@ def _in_parameters(pdu_type: int, service: int, parameters: bytes) -> tuple[Oddi
     found += [Oddity(Odd.DATE, str(when)) for when in _whens(decoded.record, 0) if when.flaw is not None]
     for tag in decoded.rest:
         found += [Oddity(Odd.DATE, str(when)) for when in _whens(tag, 0) if when.flaw is not None]
+    for tag in _misnamed(parameters):
+        found.append(Oddity(Odd.FORM, f'text "{text(tag.octets)}" is no UTF-8, as it says'))
     return tuple(dict.fromkeys(found))
+
+
+def _misnamed(parameters: bytes) -> Iterator[Tag]:
+    """Texts of another character set than they say."""
+    if parameters.isascii():
+        return
+    waiting = list(tagging.read(parameters).tags)
+    while waiting:
+        tag = waiting.pop(0)
+        if tag.children is not None:
+            waiting = [*tag.children, *waiting]
+        elif not tag.context and tag.number == NUMBER_OF["CharacterString"] and is_misnamed(tag.octets):
+            yield tag
 
 
 _PDU_WORDS: dict[int, str] = {PduType.COMPLEX_ACK: "answer", PduType.ERROR: "error"}

@@ -53,8 +53,8 @@ CONTENT_RULES = (
         Severity.NOTE,
         "parameters that do not fit",
         "The parameters of a standard service, of an answer or an error to it are cut short, lack what must be there, "
-        "hold more than belongs there, or have other tags than the standard gives them (ASHRAE 135, 20.2 and 21). "
-        "What is read is not judged.",
+        "hold more than belongs there, have other tags than the standard gives them, or texts of another character set "
+        "than they name (ASHRAE 135, 20.2 and 21). What is read is not judged.",
         "an error in the sending station's software; strict programs drop or refuse such a message, others misread it",
         "the firmware of the sender; behind a router, that of the station named",
     ),

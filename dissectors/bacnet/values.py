@@ -204,11 +204,28 @@ def base(type_name: str) -> str | None:
 
 
 _JIS = b"\x1b$B"
-_CHARSETS = {0: "utf-8", 3: "utf-32-be", 4: "utf-16-be", 5: "latin-1"}
+_CHARSETS = {3: "utf-32-be", 4: "utf-16-be", 5: "latin-1"}
+_LITTLE_ENDIAN = b"\x04\xff\xfe"
+
+
+def is_misnamed(octets: bytes) -> bool:
+    """Whether a character string says that it is UTF-8 (or ASCII, as it was before) and is not."""
+    if octets[:1] != b"\0" or octets.isascii():
+        return False
+    try:
+        octets[1:].decode("utf-8")
+    except UnicodeDecodeError:
+        return True
+    return False
 
 
 def text(octets: bytes) -> str:
-    """A character string from its character set and octets; what the set cannot say becomes U+FFFD."""
+    """A character string from its character set and octets. What the set cannot say becomes U+FFFD; octets that are no
+    UTF-8 stay themselves (`\\xe9`): they may be of any other set. Marks of the order of octets go."""
+    if octets[:1] == b"\0":
+        return octets[1:].decode("utf-8", "backslashreplace")
+    if octets.startswith(_LITTLE_ENDIAN):
+        return octets[3:].decode("utf-16-le", "replace")
     if not octets:
         raise ValueError("CharacterString of 0 octets")
     if octets[0] == 1:  # DBCS: two octets of code page first
@@ -217,7 +234,7 @@ def text(octets: bytes) -> str:
         return octets[3:].decode(codec, "replace")
     if octets[0] == 2:  # JIS X 0208: two octets a character, without the escapes that texts have around it
         return (_JIS + octets[1:]).decode("iso2022_jp", "replace")
-    return octets[1:].decode(_CHARSETS.get(octets[0], "latin-1"), "replace")
+    return octets[1:].decode(_CHARSETS.get(octets[0], "latin-1"), "replace").removeprefix("\ufeff")
 
 
 def _bits(octets: bytes, type_name: str | None) -> BitString:

@@ -59,3 +59,36 @@ def test_what_is_no_value_of_its_property(value: str, found: str) -> None:
 @pytest.mark.parametrize("apdu", ["5007 0c 9102 9120", _VALUE.format("4441b80000"), _VALUE.format("00"), "1008"])
 def test_what_fits(apdu: str) -> None:
     assert not oddities(_frame(apdu))
+
+
+_TEXT = "3007 0c 0c00800004 191c 3e 75{:02x} {} 3f"  # the description of analog-value,4
+
+
+def _described(octets: str) -> Frame:
+    return _frame(_TEXT.format(len(bytes.fromhex(octets)), octets))
+
+
+@pytest.mark.parametrize(
+    ("octets", "shown"),
+    [
+        ("00 5ac3bc7269", "Züri"),
+        ("05 5afc7269", "Züri"),
+        ("04 005a00fc", "Zü"),
+        ("04 feff005a00fc", "Zü"),
+        ("04 fffe5a00fc00", "Zü"),
+        ("03 0000feff0000005a", "Z"),
+        ("00 5a", "Z"),
+    ],
+)
+def test_texts_of_all_sets(octets: str, shown: str) -> None:
+    frame = _described(octets)
+    assert not oddities(frame)
+    assert f'= "{shown}"' in _line(frame)
+
+
+@pytest.mark.parametrize(("octets", "shown"), [("00 5afc7269", r"Z\xfcri"), ("00 d6d0", r"\xd6\xd0")])
+def test_a_text_that_is_not_what_it_says_keeps_its_octets(octets: str, shown: str) -> None:
+    frame = _described(octets)
+    (odd,) = oddities(frame)
+    assert (odd.kind, odd.words) == (Odd.FORM, f'text "{shown}" is no UTF-8, as it says')
+    assert f'= "{shown}"' in _line(frame)
