@@ -11,7 +11,7 @@ from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_hearing import hearing, takes_unheard, unheard_share
 from dissectors.bacnet.findings_of_overdue import overdue, under_late_answers
 from dissectors.bacnet.findings_of_refusals import REFUSED_KEPT, Refusals
-from dissectors.bacnet.findings_of_routers import NetworkRejections
+from dissectors.bacnet.findings_of_routers import RouterFindings
 from dissectors.bacnet.findings_of_skipping import skipped
 from dissectors.bacnet.findings_of_tokens import silences, tokens
 from dissectors.bacnet.findings_of_use import polls, use
@@ -251,7 +251,7 @@ class MstpFindings:
     def __init__(self, timing: Timing) -> None:
         self._observer = BulkRingObserver(timing)
         self._content = ContentFindings()
-        self._instances, self._rejections = DeviceInstances(), NetworkRejections()
+        self._instances, self._routers = DeviceInstances(), RouterFindings()
         self._refusals = Refusals()
         self._newest: tuple[tuple[int, Event | None], ...] = ()  # the newest two rows, their numbers before them
 
@@ -260,7 +260,7 @@ class MstpFindings:
         self._observer.see(no, event, header)
         self._content.see(no, event, header)
         self._instances.see(no, event, header)
-        self._rejections.see(no, event, header)
+        self._routers.see(no, event, header)
         self._newest = (*self._newest[-1:], (no, event))
 
     def settle(self, transaction: Transaction) -> None:
@@ -283,7 +283,7 @@ class MstpFindings:
         self._observer.take(rows)
         self._content.take(rows)
         self._instances.take(rows)
-        self._rejections.take(rows)
+        self._routers.take(rows)
         self._settle_many(rows)
 
     def _settle_many(self, rows: RowColumns) -> None:
@@ -322,5 +322,5 @@ class MstpFindings:
         """All findings so far, the gravest first."""
         ring = self._observer.ring()
         others = (*self._refusals.findings(), *self._content.findings(), *self._instances.findings(ring.nodes))
-        made = (*judge(ring), *others, *self._rejections.findings())
+        made = (*judge(ring), *others, *self._routers.findings())
         return tuple(sorted(made, key=_gravest_first))
