@@ -77,7 +77,8 @@ class DataExchanges(OpenExchanges):
     def _count_attempt(self, exchange: Exchange, key: Key, closed: list[Transaction], further: bool) -> None:
         """A request seen before without an answer is tried again; `further`: from a later segment on."""
         older = self._postponed.pop(key, None)
-        if older is not None:
+        if older is not None:  # its answer may have been under way
+            older.postponed = False
             closed.append(self._stop(older))
         past = self._past.get(key)
         if past is None:

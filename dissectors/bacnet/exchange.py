@@ -15,6 +15,10 @@ from dissectors.tracker import Interval, Transaction, Verdict
 _TOKEN, _POLL, _TEST = (bytes((kind,)) for kind in (FrameType.TOKEN, FrameType.POLL_FOR_MASTER, FrameType.TEST_REQUEST))
 
 
+NEVER_ANSWERED = "postponed, and never answered"
+"""How it ends where the station that promised an answer sends none."""
+
+
 class RequestParty(NamedTuple):
     """Who speaks at one end: the MS/TP address, and behind a router the network and address there."""
 
@@ -69,6 +73,11 @@ class Exchange:
         """Whether no answer is no fault: the polled or tested address is free."""
         return self.octets[2:3] == _POLL or (self.octets[2:3] == _TEST and self.source == self.destination)
 
+    @property
+    def is_promised(self) -> bool:
+        """Whether the station itself said that its answer comes later; a router says so for others."""
+        return self.postponed and self.key is not None and self.key.server.net is None
+
     def interval(self, answer: Frame) -> Interval:
         """From the end of the request to the begin of the answer, with what the adapter allows."""
         gap = max(0, answer.start - self.end)
@@ -106,7 +115,7 @@ class Exchange:
         if self.usurped:
             return self.close(Verdict.OPEN, error="another station answered")
         if self.response is None:
-            return self.close(Verdict.NO_RESPONSE)
+            return self.close(Verdict.NO_RESPONSE, error=NEVER_ANSWERED if self.is_promised else None)
         return self.close(Verdict.OPEN, error="its segments stopped before the last one")
 
     def close(

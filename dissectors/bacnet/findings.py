@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from dissectors.bacnet.broken_promises import BrokenPromises
 from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.device_instances import DeviceInstances
+from dissectors.bacnet.exchange import NEVER_ANSWERED
 from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_hearing import hearing, takes_unheard, unheard_share
 from dissectors.bacnet.findings_of_overdue import overdue, under_late_answers
@@ -252,7 +254,7 @@ class MstpFindings:
         self._observer = BulkRingObserver(timing)
         self._content = ContentFindings()
         self._instances, self._routers = DeviceInstances(), RouterFindings()
-        self._refusals = Refusals()
+        self._refusals, self._promises = Refusals(), BrokenPromises()
         self._newest: tuple[tuple[int, Event | None], ...] = ()  # the newest two rows, their numbers before them
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None = None) -> None:
@@ -266,6 +268,8 @@ class MstpFindings:
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed; the ring model has its own view of them, but for error answers."""
         station, verdict = transaction.station, transaction.verdict
+        if station is not None and transaction.error == NEVER_ANSWERED:
+            self._promises.add(station, transaction)
         if station is None or transaction.is_passing or verdict not in _ANSWERED:
             return
         self._refusals.answer(station, transaction.kind)
@@ -297,6 +301,9 @@ class MstpFindings:
         told &= np.isin(closed.verdict, [VERDICTS.index(verdict) for verdict in _ANSWERED])
         kinds = list(counted(closed.station[told], closed.kind[told]))
         refused = closed.verdict == VERDICTS.index(Verdict.EXCEPTION)
+        if NEVER_ANSWERED in closed.names:
+            for place in np.flatnonzero(closed.error == closed.names.index(NEVER_ANSWERED)).tolist():
+                self._promises.add(int(closed.station[place]), rows.transaction(place))
         full = len(self._refusals.asked) + len(kinds) > REFUSED_KEPT
         before = self._newest[-1:]
         for place in np.flatnonzero(told if full else told & refused).tolist():
@@ -322,5 +329,5 @@ class MstpFindings:
         """All findings so far, the gravest first."""
         ring = self._observer.ring()
         others = (*self._refusals.findings(), *self._content.findings(), *self._instances.findings(ring.nodes))
-        made = (*judge(ring), *others, *self._routers.findings())
+        made = (*judge(ring), *others, *self._routers.findings(), *self._promises.findings(ring))
         return tuple(sorted(made, key=_gravest_first))

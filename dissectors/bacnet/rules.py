@@ -228,6 +228,16 @@ _ALL = (
     ),
     *ROUTER_RULES,
     Rule(
+        "MS311",
+        Severity.WARNING,
+        "postponed and never answered",
+        "A station sent Reply Postponed, and no answer within 10 s. A single one, or fewer than 1 in 20 of what it "
+        "postponed, is only noted; what a router postpones for stations behind it is not judged.",
+        "a program that is too slow or loses what it has to answer; who asked waits until its own timeout",
+        "firmware and load of the station; how many requests it gets at once",
+        explains=("MS303",),
+    ),
+    Rule(
         "MS401",
         Severity.WARNING,
         "damaged frames",

@@ -301,6 +301,15 @@ def misfits() -> list[Step]:
     return steps + rounds(2, 12, 31)
 
 
+def never_answered() -> list[Step]:
+    """31 promises its answers for later, and sends none."""
+    steps: list[Step] = []
+    for at in range(3):
+        ask = f"{READ[:8]}{at + 1:02x}{READ[10:]}"
+        steps += [*rounds(2, 12, 31), (2, data(12, 31, ask, expects=True)), (6, frame(7, 12, 31))]
+    return steps + [(240, octets) for _ in range(23) for octets in (token(12, 31), token(31, 12))]
+
+
 def token_to_itself() -> list[Step]:
     """3 believes to be alone, and passes the token to itself; the adapter hides how soon."""
     return [(4 + at % 3 * 9, token(3, 3)) for at in range(60)]
@@ -337,6 +346,7 @@ MADE = {
     "ms-tp-answers-what-others-are-asked": answers_for_others,
     "ms-tp-answers-in-place-of-another": taken_for_anothers,
     "ms-tp-parameters-that-do-not-fit": misfits,
+    "ms-tp-postponed-and-never-answered": never_answered,
     "ms-tp-token-to-itself-behind-an-adapter": token_to_itself,
 }
 
