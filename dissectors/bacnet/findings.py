@@ -9,6 +9,7 @@ from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.device_instances import DeviceInstances
 from dissectors.bacnet.exchange import NEVER_ANSWERED
+from dissectors.bacnet.findings_of_astray_polls import astray
 from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_hearing import hearing, takes_unheard, unheard_share
 from dissectors.bacnet.findings_of_overdue import overdue, under_late_answers
@@ -80,6 +81,7 @@ def judge(ring: Ring) -> tuple[Finding, ...]:
         *_counted(ring),
         *_times(ring),
         *polls(ring),
+        *astray(ring),
         *_answers(ring),
         *_for_others(ring),
         *waiting(impatient(ring)),

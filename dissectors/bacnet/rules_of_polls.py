@@ -57,4 +57,14 @@ POLL_RULES = (
         "drops it; who answered stays out of the ring",
         "turnaround and firmware of the station named; the wiring between it and those that answer",
     ),
+    Rule(
+        "MS206",
+        Severity.NOTE,
+        "polls beyond its successor",
+        "A station that has lost nobody polls three addresses and more that do not lie between it and the station to "
+        "which it passes its token; only there it may have to find one (ASHRAE 135, 9.5.6).",
+        "its Max_Master is lower than its own address, or its program looks for new stations wrongly: whoever answers "
+        "there is taken for its successor, and those between fall out of the ring; between them it finds nobody",
+        "Max_Master and firmware of the station",
+    ),
 )
