@@ -234,6 +234,6 @@ SPELLINGS: tuple[Spelling, ...] = (
     Spelling("character codes", r"#\d{1,3}", "", _codes, SURELY, before=r"(?<![0-9A-Za-z_])"),
     Spelling("digits after a sign", rf"(?:&H[0-9A-Fa-f]{{1,2}}|[$%&#]{H2})", r"[ ,;]{0,2}",
              _by(r"[H$%&#]([0-9A-Fa-f]{1,2})", 16), 2, before=r"(?<![0-9A-Za-z_])"),
-    Spelling("H and digits", rf"H{H2}", r"[ ,;]{1,2}", _by(rf"H({H2})", 16), 3),
+    Spelling("H and digits", rf"(?:H{H2}|h[0-9A-F]{{2}})", r"[ ,;]{1,2}", _by(rf"[Hh]({H2})", 16), 3),
 )  # fmt: skip
 """Those whose digits need no guess, the most special first."""

@@ -10,7 +10,7 @@ together, then done with each line. Pure.
     numbers in columns              "  17   3 107"  →  "17 3 107"
     escapes of other languages      \\017 (Lua, decimal), \\B4 (LabVIEW)  →  \\x11, \\xb4
     characters among escapes        \\x11\\x03k\\x00  →  \\x11\\x03\\x6b\\x00
-    characters among brackets       [11][03]k[00], {11}{03}k{00}  →  [11][03][6b][00]
+    characters among brackets       [11][03]k[00], {11}{03}k{00}, {h11}{h03}k{h00}  →  [11][03][6b][00]
     a string a character            [RX:'\\x11'] [RX:'k']  →  RX '\\x11\\x6b'
     rows of numbers (`dump_rows.py`)  0000000 021 003  \\0   k  →  0000000  11 03 00 6b
     groups of eight, with signs     43 40 - 49 ad  →  43 40 49 ad; the ruler above them  →  nothing
@@ -87,6 +87,8 @@ class Writing:
             text = _rewritten_escapes(text, self.escapes)
         if self.mixed and "\\" in text and _QUOTED.search(text) is None:
             text = _MIXED.sub(_as_escapes, text)
+        if "{h" in text:
+            text = _BRACED.sub(r"{\1}", text)
         if self.brackets:
             text = _in_brackets(text, self.brackets)
         if self.columns:
@@ -100,6 +102,7 @@ USUAL = Writing()
 
 def writing_of(texts: Sequence[str]) -> Writing:
     """How a log that begins so writes octets."""
+    texts = [_BRACED.sub(r"{\1}", text) if "{h" in text else text for text in texts]
     escapes = _escapes_of(texts)
     slashed = [_rewritten_escapes(text, escapes) for text in texts if "\\" in text]
     return Writing(
@@ -289,6 +292,7 @@ def _joined_strings(match: re.Match[str]) -> str:
 # -- characters among octets in brackets ----------------------------------------------------------------------------
 
 _BRACKETS = ("[]", "{}", "<>")
+_BRACED = re.compile(r"\{h([0-9A-Fa-f]{2})\}")
 _AMONG = {
     pair: re.compile(
         rf"{re.escape(pair[0])}[0-9A-Fa-f]{{2}}{re.escape(pair[1])}"

@@ -21,7 +21,7 @@ LATEST = 1 << 33
 """s; beyond it a number is no time."""
 
 _SHOWN = re.compile(r"\(0[xX]([0-9A-Fa-f]{2})\)\s*")  # behind the character, as Saleae shows "ASCII and hex"
-_PAIR = re.compile(r"[\s,;]*(?:0[xX])?([0-9A-Fa-f]{2})")
+_PAIR = re.compile(r"[\s,;]*(?:0[xX]|h)?([0-9A-Fa-f]{2})")
 _DECIMAL = re.compile(r"\d{1,3}")
 _BINARY = re.compile(r"(?:0b)?[01]{4}[ _]?[01]{4}")
 _QUOTED = re.compile(r"'(\d{1,3})'")

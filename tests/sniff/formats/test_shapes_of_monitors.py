@@ -31,6 +31,11 @@ def way(number: int) -> str:
     return "Host   -->" if number % 2 == 0 else "Device -->"
 
 
+def braced(octet: int) -> str:
+    """As WaveForms shows a character."""
+    return chr(octet) if 0x20 < octet < 0x7F else f"{{h{octet:02X}}}"
+
+
 def apart(octets: bytes) -> str:
     return octets.hex(" ").replace(" ", "  ").upper()
 
@@ -97,6 +102,14 @@ SHAPES: dict[str, tuple[bytes, int | None]] = {  # what is in the log, and ns fr
     ),
     "a date before @": (
         lines(lambda number, frame: f"28/12/2022@22:43:{number:02d}.100::>>COM5 Sent\n{frame.hex('|')}| | | || . ."),
+        1000 * MS,
+    ),
+    "hexadecimal among characters in braces": (
+        lines(lambda number, frame: f"{number}: " + "".join(map(braced, frame))),
+        None,
+    ),
+    "h ahead of each": (
+        lines(lambda number, frame: f"10:00:{number:02d}.100," + " ".join(f"h{one:02X}" for one in frame)),
         1000 * MS,
     ),
     "an octet behind <": (
