@@ -70,8 +70,10 @@ def other_protocol(sample: Sequence[Chunk], line: LineSettings, latency: int, pr
     if sum(len(chunk.octets) for chunk in sample) < LEAST_OCTETS:
         return None
     found = _convincing(_evidence(sample, line, latency))
-    if found is None or found.protocol == protocol:
-        return _of_network(sample, line, latency) if found is None else None
+    if found is None:
+        return _of_network(sample, line, latency) or next(_by_neighbour(sample, "somebody speaks"), None)
+    if found.protocol == protocol:
+        return None
     return _as_protocol(found, "these octets read", f"somebody speaks {found.protocol}", f"-p {found.protocol}")
 
 
@@ -92,6 +94,7 @@ def _fits(sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: s
         )
     if (of_network := _of_network(sample, line, latency)) is not None:
         yield of_network
+    yield from _by_neighbour(sample, "the bus runs")
     yield from _by_line_ends(sample, line, latency)
     inverted = _changed(sample, 0xFF, 0xFF)
     if (found := _convincing(_evidence(inverted, line, latency))) is not None:
@@ -118,6 +121,13 @@ def _by_parity(sample: Sequence[Chunk], bus: LineSettings, line: LineSettings, l
             ),
             is_parity=True,
         )
+
+
+def _by_neighbour(sample: Sequence[Chunk], who: str) -> Iterator[Fit]:
+    """Another protocol, which nobody here reads, with frames of the form of one that is known."""
+    octets = b"".join(chunk.octets for chunk in sample)
+    for said in filter(None, (dissector.neighbour(octets) for dissector in registry.usable())):
+        yield Fit(f"these octets are of {said}", f"{who} {said}", "a program that reads it; this one does not")
 
 
 def _by_line_ends(sample: Sequence[Chunk], line: LineSettings, latency: int) -> Iterator[Fit]:

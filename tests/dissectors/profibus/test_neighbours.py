@@ -66,7 +66,9 @@ def test_no_search_takes_them_for_telegrams(tmp_path: Path) -> None:
     assert told.sureness is Sureness.NO
     assert FT12 in told.words
     chunks = [Chunk(number * 100_000_000, frame) for number, frame in enumerate(frames, 1)]
-    assert other_protocol(chunks, LINE, 0, "modbus-rtu") is None
+    named = other_protocol(chunks, LINE, 0, "modbus-rtu")
+    assert named is not None
+    assert named.means == f"somebody speaks {FT12}"
     search = Detecting((LINE,), ("profibus",))
     for chunk in chunks:
         search.feed(chunk)
