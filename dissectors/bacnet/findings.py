@@ -20,6 +20,7 @@ from dissectors.bacnet.findings_of_tokens import silences, tokens
 from dissectors.bacnet.findings_of_use import polls, use
 from dissectors.bacnet.findings_of_waiting import impatient, waiting
 from dissectors.bacnet.limits import MAX_MASTER, T_REPLY_DELAY, T_USAGE_DELAY
+from dissectors.bacnet.long_answers import LongAnswers
 from dissectors.bacnet.ring import COARSE_LIMIT, Ring, RingNode
 from dissectors.bacnet.ring_events import Happened, RingEventKind
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
@@ -255,7 +256,7 @@ class MstpFindings:
     def __init__(self, timing: Timing) -> None:
         self._observer = BulkRingObserver(timing)
         self._content = ContentFindings()
-        self._instances, self._routers = DeviceInstances(), RouterFindings()
+        self._instances, self._routers, self._lengths = DeviceInstances(), RouterFindings(), LongAnswers()
         self._refusals, self._promises = Refusals(), BrokenPromises()
         self._newest: tuple[tuple[int, Event | None], ...] = ()  # the newest two rows, their numbers before them
 
@@ -265,6 +266,7 @@ class MstpFindings:
         self._content.see(no, event, header)
         self._instances.see(no, event, header)
         self._routers.see(no, event, header)
+        self._lengths.see(no, event, header)
         self._newest = (*self._newest[-1:], (no, event))
 
     def settle(self, transaction: Transaction) -> None:
@@ -290,6 +292,7 @@ class MstpFindings:
         self._content.take(rows)
         self._instances.take(rows)
         self._routers.take(rows)
+        self._lengths.take(rows)
         self._settle_many(rows)
 
     def _settle_many(self, rows: RowColumns) -> None:
@@ -331,5 +334,6 @@ class MstpFindings:
         """All findings so far, the gravest first."""
         ring = self._observer.ring()
         others = (*self._refusals.findings(), *self._content.findings(), *self._instances.findings(ring.nodes))
-        made = (*judge(ring), *others, *self._routers.findings(), *self._promises.findings(ring))
+        others += (*self._routers.findings(), *self._promises.findings(ring), *self._lengths.findings())
+        made = (*judge(ring), *others)
         return tuple(sorted(made, key=_gravest_first))

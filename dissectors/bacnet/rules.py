@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dissectors.bacnet.content_findings import CONTENT_RULES
 from dissectors.bacnet.findings_of_routers import ROUTER_RULES
+from dissectors.bacnet.long_answers import LENGTH_RULES
 from dissectors.bacnet.rules_of_polls import POLL_RULES
 from dissectors.findings import Rule, Severity
 
@@ -364,4 +365,4 @@ _ALL = (
     ),
 )
 
-RULES: dict[str, Rule] = {rule.code: rule for rule in (*_ALL, *CONTENT_RULES)}
+RULES: dict[str, Rule] = {rule.code: rule for rule in (*_ALL, *CONTENT_RULES, *LENGTH_RULES)}

@@ -310,6 +310,13 @@ def never_answered() -> list[Step]:
     return steps + [(240, octets) for _ in range(23) for octets in (token(12, 31), token(31, 12))]
 
 
+def too_long() -> list[Step]:
+    """12 takes 50 octets at once, and 31 sends it a name of 60."""
+    name = f"30010c0c020004d2194d3e753d00{'41' * 60}3f"
+    once = [*rounds(8, 12, 31), (2.0, data(12, 31, READ.replace("0003", "0000"), expects=True))]
+    return [*once, (9, data(31, 12, "0100" + name))] * 3 + rounds(3, 12, 31)
+
+
 def token_to_itself() -> list[Step]:
     """3 believes to be alone, and passes the token to itself; the adapter hides how soon."""
     return [(4 + at % 3 * 9, token(3, 3)) for at in range(60)]
@@ -347,6 +354,7 @@ MADE = {
     "ms-tp-answers-in-place-of-another": taken_for_anothers,
     "ms-tp-parameters-that-do-not-fit": misfits,
     "ms-tp-postponed-and-never-answered": never_answered,
+    "ms-tp-answers-longer-than-asked-for": too_long,
     "ms-tp-token-to-itself-behind-an-adapter": token_to_itself,
 }
 
