@@ -37,6 +37,7 @@ _NEXT = {
     "preempted-by-higher-priority-task": _BUSY,
     "busy": _BUSY,
     "timeout": _BUSY,
+    "read-access-denied": "who may read it; the buffer of a log is read by ReadRange alone",
     "write-access-denied": "whether the property can be written at all, or only while out-of-service is true; who may",
     "value-out-of-range": "the value that is sent, against the limits of the object",
     "invalid-data-type": "the type of the value that is sent, against that of the property; Null gives it up",
