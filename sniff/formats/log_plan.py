@@ -22,7 +22,7 @@ from sniff.formats.log_octets import PAIRS_ONLY
 from sniff.formats.log_outline import Outline, outlines_of, short_line
 from sniff.formats.log_repeats import FEW, doubled, echoing, growing
 from sniff.formats.log_rewriting import are_codes, as_codes, with_escapes
-from sniff.formats.log_shapes import Role
+from sniff.formats.log_shapes import PORTMON, Role
 from sniff.formats.log_spellings import SURELY
 from sniff.formats.log_times import AS_WRITTEN, FASTEST, Times, counted, number_ahead, order_of
 from sniff.formats.usb_serial import STATUS, begin_with_status
@@ -196,8 +196,8 @@ def _steps(lines: Sequence[Line], times: Times) -> Times:
         return replace(times, clocks_only=True) if clocks < len(stamps) <= 2 * clocks else times
     if not stamps:
         return times
-    if len(stamps) < _NUMBERED * len(told):
-        return replace(times, clocks_only=True)  # how long an answer took, beside answers
+    if len(stamps) < _NUMBERED * len(told) or any(line.tool == PORTMON for line in told):
+        return replace(times, clocks_only=True)  # how long an answer took, beside answers, or a request
     if len(stamps) < _FIXED_LEAST:
         return times
     changes = [later.time - earlier.time for earlier, later in pairwise(stamps) if later.time != earlier.time]

@@ -50,6 +50,9 @@ class Shape:
     """Of the numbers in `octets`, where only the tool tells."""
 
 
+PORTMON = "Portmon"
+"""Whose times are how long each request took."""
+
 _H = r"[0-9A-Fa-f]{1,2}"
 _H2 = r"[0-9A-Fa-f]{2}"
 _S = r"\0"
@@ -144,6 +147,9 @@ SHAPES: tuple[Shape, ...] = (
     _shape("eModbus", r"\bData: @[0-9A-Fa-f]{6,16}/\d", Role.HEADING, _of_emodbus),
     _shape("eModbus", r"\bRaw buffer (?P<way>received): @[0-9A-Fa-f]{6,16}/\d", Role.HEADING),
     _shape("eModbus", r"\|\s*\w+\.(?:cpp|h)\s*\[.*\]"),
+    _shape(PORTMON, r"\bIRP_MJ_(?P<way>READ|WRITE)\s+\S+\s+[A-Z_]+\s+"
+                    rf"Length:? (?P<count>\d+):?\s+(?P<octets>{_H2}(?: {_H2})*)"),
+    _shape(PORTMON, r"\b(?:IRP_MJ|IOCTL)_\w+\s+\S+\s+(?:SUCCESS|TIMEOUT|CANCELLED|PENDING)\b", Role.NOTHING),
     _shape("Serial Port Monitor", r"(?P<way>Read|Written|Write) data \(COM\d+\)", Role.HEADING),
     _shape("Serial Port Monitor", r"(?:Open|Close|Opened|Closed)\b.*port|IOCTL_|IRP_MJ_(?:CREATE|CLOSE|DEVICE)",
            Role.NOTHING),

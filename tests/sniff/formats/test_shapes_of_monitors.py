@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -34,6 +35,15 @@ def way(number: int) -> str:
 def braced(octet: int) -> str:
     """As WaveForms shows a character."""
     return chr(octet) if 0x20 < octet < 0x7F else f"{{h{octet:02X}}}"
+
+
+IDLE = "drive.exe IRP_MJ_READ Serial0 TIMEOUT Length 0: "
+
+
+def took(number: int, octets: bytes) -> str:
+    """As Portmon does."""
+    lasted, what = (391, "WRITE") if number % 2 == 0 else (1551789, "READ")
+    return f"7 0.0{lasted:07d} drive.exe IRP_MJ_{what} Serial0 SUCCESS Length {len(octets)}: {octets.hex(' ').upper()} "
 
 
 def apart(octets: bytes) -> str:
@@ -112,6 +122,7 @@ SHAPES: dict[str, tuple[bytes, int | None]] = {  # what is in the log, and ns fr
         lines(lambda number, frame: f"10:00:{number:02d}.100," + " ".join(f"h{one:02X}" for one in frame)),
         1000 * MS,
     ),
+    "how long each request took": (lines(lambda number, frame: f"{took(number, frame)}\n9 0.00000391 {IDLE}"), None),
     "an octet behind <": (
         b"".join(b"2022-09-29 22:43:36.4%d4 <%02x\n" % (at % 10, one) for at, one in enumerate(FRAMES[0][:8])),
         10 * MS,
@@ -164,3 +175,26 @@ def test_an_octet_that_says_its_base_counts_before_its_decimal() -> None:
     run = octets_in("> | 0x5e | 94 | |")
     assert run is not None
     assert run.octets == b"\x5e"
+
+
+def test_durations_are_no_times(tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    path.write_bytes(SHAPES["how long each request took"][0])
+    assert not read(path).session.has_times
+
+
+def test_what_a_tool_tells_in_two_spellings_is_told_once(tmp_path: Path) -> None:
+    pieces = [b":0105", b"0", b"000FF00FB\r\n"] * 3
+    path = tmp_path / "x.log"
+    told = "  modbus-serial { action: 'receive',\n  modbus-serial   data: <Buffer %s>,\n"
+    again = '  modbus-serial {"action":"receive","data":{"type":"Buffer","data":%s}} +1ms\n'
+    path.write_text("".join(told % piece.hex(" ") + again % json.dumps(list(piece)) for piece in pieces))
+    capture = read(path)
+    assert b"".join(item.octets for item in capture.items() if isinstance(item, Chunk)) == b"".join(pieces)
+    assert capture.completeness().whole
+
+
+def test_lists_of_a_tool_are_decimal_though_they_may_be_pairs(tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    path.write_text('{"action":"send","data":{"type":"Buffer","data":[58,48,49,48,51,70,67,13,10]}}\n' * 3)
+    assert read(path).session.sample[0].octets.startswith(b":0103FC\r\n")
