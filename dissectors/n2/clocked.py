@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Final
 
 from dissectors.n2.unheard import SOON
 from dissectors.rhythm import Rhythm
+
+PAUSES_LEAST: Final = 16
+"""Pauses of a master after which its usual ones are known."""
 
 
 @dataclass(slots=True)
@@ -26,3 +30,9 @@ class Clocked:
         (begin, end, answer_end), self._answered = self._answered, None
         if start - end < SOON:
             self.rhythm.turns.append((start - begin, answer_end - begin))
+
+    @property
+    def short_pause(self) -> int | None:
+        """A pause of the master behind an answer, than which three in four are longer; None where few are known."""
+        pauses = sorted(cycle - answer for cycle, answer in self.rhythm.turns)
+        return pauses[len(pauses) // 4] if len(pauses) >= PAUSES_LEAST else None

@@ -257,7 +257,10 @@ class N2Findings:
         """All findings so far: the bus first, then station by station."""
         span = self.now - (self.first or 0) - self._unheard
         masters, clocked = self.masters, self.clocked.rhythm.is_by_the_clock
-        heard = N2Evidence(self.now, span, self.master, self.stations, masters, self._stray, self.strikes, clocked)
+        soon = Tally() if clocked else masters.sooner_than(self.clocked.short_pause)
+        heard = N2Evidence(
+            self.now, span, self.master, self.stations, masters, soon, self._stray, self.strikes, clocked
+        )
         found = (reaching(one, self.late_speakers) if one.code == "N2011" else one for one in worded(heard))
         return (*found, *of_late_speakers(heard, self.late_speakers))
 

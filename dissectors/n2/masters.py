@@ -7,13 +7,17 @@ only this counts:
 - a command that follows another one sooner than the station asked ever answered, and than any master gives up
 - an answer that came in its usual time, and yet after the next command
 - damaged commands, far more often than elsewhere, where the answer to the one before is due: two spoke at once
+- commands behind others with nothing between, most of them sooner than the master goes on behind an answer: what an
+  adapter does to a time it does to both
 """
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 from typing import Final
 
+from dissectors.chances import at_least
 from dissectors.findings import Tally
 from dissectors.frame import Damage, Frame
 from dissectors.n2.commands import Command
@@ -26,6 +30,10 @@ HASTE: Final = 100_000_000
 
 KNOWN: Final = 8
 """Answers of a station after which its shortest time says something."""
+
+_NEXT_KEPT = 64
+_NEXT_LEAST = 5
+_SELDOM = 0.002
 
 _BEGIN = 3  # octets of a command: start and address
 _SAME = 6  # octets of two commands: start, address, command and what it asks
@@ -49,6 +57,8 @@ class Masters:
     seen: Tally = field(default_factory=Tally)
     damaged: Tally = field(default_factory=Tally)
     _last: OpenCommand | None = None  # the newest command, while nothing has come after it
+    _next: deque[tuple[int, OpenCommand, OpenCommand]] = field(default_factory=lambda: deque(maxlen=_NEXT_KEPT))
+    # ns between good commands to others, of which the first had no answer
 
     def see_other(self) -> None:
         """Something that is no command came, or may have come."""
@@ -74,8 +84,20 @@ class Masters:
             return
         if station is None or station.quickest is None or station.answered < KNOWN:
             return
+        if asked.frame.ok:
+            self._next.append((max(0, asked.frame.start - frame.end), last, asked))
         if longest < station.quickest:
             self.seen.add(asked.frame.start, last.row, asked.row)
+
+    def sooner_than(self, pause: int | None) -> Tally:
+        """The commands that came sooner than a pause of the master, than which three in four are longer, where so many
+        did so as no chance makes of answers that were not heard; else none."""
+        soon = Tally()
+        for gap, last, asked in self._next if pause is not None else ():
+            if pause is not None and gap < pause:
+                soon.add(asked.frame.start, last.row, asked.row)
+        is_chance = soon.count < _NEXT_LEAST or at_least(soon.count, len(self._next), 1 / 4) >= _SELDOM
+        return Tally() if is_chance else soon
 
     def see_damaged(self, last: OpenCommand, no: int, frame: Frame) -> None:
         """Take a damaged command, and the one before it, that nothing has come after."""

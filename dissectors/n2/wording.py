@@ -52,6 +52,7 @@ class N2Evidence:
     master: Damages
     stations: Mapping[int, N2StationRecord]
     masters: Masters
+    soon: Tally  # commands that came sooner than the master goes on behind an answer
     stray: Tally
     strikes: Strikes
     clocked: bool  # the master sends by a clock: that it goes on says nothing of an answer
@@ -100,6 +101,10 @@ def worded(heard: N2Evidence) -> Iterator[Finding]:
         seen = f"{masters.damaged.count} of {counted(heard.master.bad.count, 'damaged command')} came while the answer "
         seen += f"to the one before was due, sooner than a master gives up ({duration(HASTE)})"
         yield masters.damaged.found(RULES["N2007"], "bus", seen)
+    elif heard.soon.count:
+        seen = f"{times(heard.soon.count)} a command followed another one, that nothing came to, sooner than three in "
+        seen += "four follow an answer"
+        yield heard.soon.found(RULES["N2007"], "bus", seen)
     if heard.stray.count:
         seen = f"{counted(heard.stray.count, 'answer')} came unasked"
         finding = meanings.of_unasked_answers(heard.stray.found(RULES["N2011"], "bus", seen))

@@ -14,6 +14,7 @@ from dissectors.n2.simulated import reading
 from dissectors.simulated import Station
 from dissectors.simulated_faults import BitFlips, LateResponse, LostResponse, NoiseInGaps
 from sniff.simulation.tap import FTDI
+from tests.faults.buses import n2
 from tests.faults.case import Case, Said
 from tests.faults.hearing import of_party, sent_otherwise
 from tests.faults.misbehaving import OnTheTick, Trimmed, When
@@ -76,6 +77,16 @@ _by_the_clock = N2(
 )
 
 N2_CASES: tuple[Case, ...] = (
+    # times that an adapter hides prove no answer that is too soon: that all pauses are longer does
+    Case(
+        "N2 two masters, FTDI",
+        partial(n2, second_master=True),
+        (("N2007", "bus"),),
+        FTDI,
+        struck=("station 1", "station 2"),
+        also=("N2008",),
+        seeds=1,
+    ),
     # a master that goes on as after an answer, since it never waits for one
     Case(
         "N2 station dies, master by the clock",
