@@ -126,7 +126,7 @@ RULES: dict[str, Rule] = {
             "100 and not surely over two a minute, is only noted.",
             "a master that is not heard at this place of the bus, or a station far slower than the master's timeout",
             "compare the answer times with the master's timeout; move the tap",
-            explains=("N2005", "N2003", "N2015", "N2016", "LN1", "LN2"),
+            explains=("N2005", "N2003", "N2015", "N2016", "LN1", "LN201", "LN202", "LN203", "LN204"),
         ),
         Rule(
             "N2012",
@@ -149,7 +149,7 @@ RULES: dict[str, Rule] = {
             "answer repeated",
             "The same good answer came again to one command, later than an echo would. A single one, or fewer than 1 "
             "in 100 and not surely over two a minute, is only noted. It proves no second station: the octets are the "
-            "same.",
+            "same. Where half of the answers of each of several stations do so, one finding names the bus.",
             "a repeater or converter that gives back what it hears, a station that sends twice, or two stations with "
             "one address that hold the same",
             "switch the station off and see whether something still answers; then the repeater",

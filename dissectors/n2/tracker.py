@@ -327,10 +327,12 @@ class N2Tracker:
             if owing is not None:
                 self._forget(owing)
                 return self._separate(no, frame, header, Verdict.LATE, owing, closed)
-            if frame.octets == done.answer and frame.start - done.answer_end <= self._at_once:
+            at_once = frame.octets == done.answer and frame.start - done.answer_end <= self._at_once
+            self._doubles.update([done.station] * (again or at_once))
+            everybody = len(self._doubles) > 1 and self._times.keys() <= self._doubles.keys()
+            if at_once and (done.echoed or everybody):  # the bus does so
                 return self._echo(no, frame, Role.RESPONSE, done, closed)
             if frame.start - done.end <= GIVE_UP and may_answer(parse_command(done.octets), frame.octets):
-                self._doubles[done.station] += again
                 return self._separate(no, frame, header, Verdict.ANSWERED_TWICE, done, closed)
         elif missed is not None and frame.start - missed.end <= 2 * GIVE_UP:
             self._forget(missed)

@@ -16,6 +16,7 @@ from dissectors.n2.commands import error_name
 from dissectors.n2.masters import HASTE, Masters
 from dissectors.n2.objects import REGIONS, attribute_name, number, object_name
 from dissectors.n2.record import Damages, N2StationRecord
+from dissectors.n2.repeats import is_repeated_by_all, repeats_of_all
 from dissectors.n2.rules import RULES
 from dissectors.n2.unheard import SOON
 from dissectors.strikes import Strikes
@@ -117,6 +118,8 @@ def worded(heard: N2Evidence) -> Iterator[Finding]:
     silent = _silent(heard, scanned)
     if silent:
         yield _nobody(heard, silent)
+    if is_repeated_by_all(heard.stations.values()):
+        yield repeats_of_all(heard.stations.values())
     told = scanned | silent | _only_unheard(heard)
     for address in sorted(heard.stations):
         yield from _of_station(heard, f"station {address}", heard.stations[address], address in told)
@@ -297,7 +300,7 @@ def _of_station(heard: N2Evidence, name: str, station: N2StationRecord, is_told:
         yield _missing(heard, name, station)
     yield from _misfits(heard, name, station)
     yield from _overrides(heard, name, station)
-    yield from _again(heard, name, station)
+    yield from _again(heard, name, station, is_repeated_by_all(heard.stations.values()))
     refused = sum(tally.count for tally in station.refused.values())
     is_all = refused >= REFUSED_LEAST and refused == station.answered
     for (code, title), tally in sorted(station.refused.items()):
@@ -376,7 +379,7 @@ def _overrides(heard: N2Evidence, name: str, station: N2StationRecord) -> Iterat
             yield tally.found(RULES["N2006"], f"{name}, {object_name(region, point)}", seen)
 
 
-def _again(heard: N2Evidence, name: str, station: N2StationRecord) -> Iterator[Finding]:
+def _again(heard: N2Evidence, name: str, station: N2StationRecord, is_by_all: bool) -> Iterator[Finding]:
     """Answers that came a second time, or late."""
     # an N2 answer names nobody: what came soon behind commands to a station that is late may be that one's
     own = [tally for other, tally in station.beside.items() if tally.count > heard.late_of(other)]
@@ -384,7 +387,7 @@ def _again(heard: N2Evidence, name: str, station: N2StationRecord) -> Iterator[F
     if twice.count:
         seen = f"a second, different answer came to {counted(twice.count, 'command')}"
         yield heard.noted_if(twice.count == 1, twice.found(RULES["N2008"], name, seen))
-    if station.repeated.count:
+    if station.repeated.count and not is_by_all:
         seen = f"the same answer came again to {counted(station.repeated.count, 'command')}"
         finding = station.repeated.found(RULES["N2013"], name, seen)
         yield heard.noted_if(heard.is_rare(station.repeated, station.answered), finding)

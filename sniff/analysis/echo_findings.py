@@ -33,13 +33,14 @@ class EchoesHeard:
     def __init__(self, latency: int) -> None:
         self._is_timed = latency < TIMELESS
         self._echoes = Tally()
+        self._copies = 0  # of them those of answers
         self._asked = self._answered = 0
         self._pending: dict[int, None] = {}  # requests with an echo that are still open, by transaction
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
         if transaction.verdict is Verdict.ECHO:
-            self._add(transaction.start, transaction.request, transaction.of)
+            self._add(transaction.start, transaction.request, transaction.response, transaction.of)
         elif transaction.request is not None:
             self._asked += 1
             self._close(transaction.id, transaction.verdict in _ANSWERED)
@@ -58,27 +59,31 @@ class EchoesHeard:
         is_answered = np.isin(closed.verdict, [VERDICTS.index(one) for one in _ANSWERED])
         for place in np.flatnonzero(is_echo | asks).tolist():
             if is_echo[place]:
-                no, of = int(closed.request[place]), int(closed.of[place])
-                self._add(int(closed.start[place]), None if no == NONE else no, None if of == NONE else of)
+                told = (int(each[place]) for each in (closed.request, closed.response, closed.of))
+                self._add(int(closed.start[place]), *(None if no == NONE else no for no in told))
             else:
                 self._close(int(closed.id[place]), bool(is_answered[place]))
 
     def found(self) -> Finding | None:
         """What there is to say of them."""
-        count = self._echoes.count
-        if not count:
+        count = self._echoes.count - self._copies
+        if not self._echoes.count:
             return None
         words = f"{count} of {counted(self._asked, 'request')} came twice, the copy directly behind"
         if count > self._asked:  # several copies of one, or of some that are still open
             words = f"{counted(count, 'request')} came directly behind the same request"
+        if self._copies:
+            answers = f"{counted(self._copies, 'answer')} came twice"
+            words = f"{words}; {answers}" if count else f"{answers}, the copy directly behind"
         is_told = self._is_timed or self._answered >= ECHOES_LEAST
-        often = count >= ECHOES_LEAST and 2 * count >= self._asked
+        often = (most := max(count, self._copies)) >= ECHOES_LEAST and 2 * most >= self._asked
         if not is_told:
             words += "; how soon, is not known, and a master that repeats would look the same"
         return self._echoes.found(RULES["LN205"], "bus", words, Severity.WARNING if often and is_told else None)
 
-    def _add(self, start: int, no: int | None, of: int | None) -> None:
-        self._echoes.add(start, no)
+    def _add(self, start: int, request: int | None, response: int | None, of: int | None) -> None:
+        self._echoes.add(start, response if request is None else request)
+        self._copies += request is None
         if of is not None and len(self._pending) < _PENDING:
             self._pending[of] = None
 

@@ -211,10 +211,11 @@ _ALL = (
         "LN205",
         Severity.NOTE,
         "echo",
-        "An exact copy of a request directly behind it. What gives back all that it hears does so with nearly every "
-        "request: a warning from three on, and half of the requests.",
+        "An exact copy of a request, or of an answer, directly behind it. What gives back all that it hears does so "
+        "with nearly every one: a warning from three on, and half of the requests.",
         "a repeater or converter that gives back what it hears, or an adapter that hears itself",
         "the echo setting of the master's adapter or of the converter; it halves the time left on the bus",
+        explains=("N2011", "N2013", "LN204"),
     ),
     Rule(
         "LN206",
