@@ -74,7 +74,7 @@ _TIMED: tuple[tuple[str, RingEventKind, int, str], ...] = (
 
 def judge(ring: Ring) -> tuple[Finding, ...]:
     """All findings about a ring, the gravest first, consequences as notes that name their cause."""
-    late = sorted(overdue(ring), key=lambda one: -one.finding.count)
+    late = sorted(overdue(ring), key=lambda one: (one.finding.cause is not None, -one.finding.count))
     made = [
         *tokens(ring),
         *silences(ring),

@@ -217,7 +217,7 @@ _ALL = (
         "Damage within 250 ms after the answer of a station should have come (250 ms, Treply_delay), far more often "
         "than chance brings (under 1 in 500), where half of the damaged frames and more stand so: three times of a "
         "station that is heard to answer late, five times of one that is not, where it is hardly ever behind requests "
-        "to others.",
+        "to others. Where that is so of several, alone or together, one finding names the bus and says who they are.",
         "the station answers when another one has the token, and its answers run into the frames of others, who are "
         "not to blame",
         "load and firmware of the station named: it must answer within 250 ms or send Reply Postponed (ASHRAE 135, "
