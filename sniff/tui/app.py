@@ -308,18 +308,26 @@ class SnifferApp(Analyzer):
 
     def action_freeze(self) -> None:
         """Freeze the view or let it go on; where nothing comes any more it stands anyway."""
-        if not self.viewing.frozen and (not self.status.live or self.status.ended):
-            what = "the capture has ended" if self.status.live else "a file stands still"
-            self.notify(f"{what}: there is nothing to freeze", timeout=3)
+        if not self.viewing.frozen and self._stands_still("freeze"):
             return
         self.viewing.freeze(not self.viewing.frozen)
         self.draw_screen()
 
     def action_follow(self) -> None:
         """Follow the newest row or stay; a frozen view goes on and follows."""
+        if not (self.viewing.follow or self.viewing.frozen or self.status.reading) and self._stands_still("follow"):
+            return
         self.viewing.follow = self.viewing.frozen or not self.viewing.follow
         self.viewing.freeze(False)
         self.draw_screen()
+
+    def _stands_still(self, to_do: str) -> bool:
+        """Whether nothing comes any more; then it is said that there is nothing to do so."""
+        if self.status.live and not self.status.ended:
+            return False
+        what = "the capture has ended" if self.status.live else "a file stands still"
+        self.notify(f"{what}: there is nothing to {to_do}", timeout=3)
+        return True
 
     def action_time(self) -> None:
         """Next way to count time."""

@@ -9,6 +9,9 @@ from sniff.analysis.sanitizing import sanitized
 from sniff.tui.index import Index
 from sniff.tui.view_state import Viewing
 
+LEAST = 20
+"""Cells that a filter has at least: what is counted, and that esc removes it, is said shorter then."""
+
 
 class FilterLine(Static):
     """Hidden while everything is shown."""
@@ -22,5 +25,8 @@ class FilterLine(Static):
         state = f", {index.pending} to be searched" if index.pending else ""
         text = Text(f"filter: {sanitized(viewing.filter)}", no_wrap=True, overflow="ellipsis")
         tail = f"{len(index)} of {whole} {things}{state} · esc removes it "
-        text.truncate(max(20, self.app.size.width - len(tail) - 2), overflow="ellipsis", pad=True)
+        width = self.app.size.width
+        if width < LEAST + 2 + len(tail):
+            tail = f"{len(index)} of {whole} · esc "
+        text.truncate(max(LEAST, width - len(tail) - 2), overflow="ellipsis", pad=True)
         self.update(text.append("  ").append(tail))

@@ -23,6 +23,8 @@ Check = Callable[[str], str]
 Complete = Callable[[str], Sequence[Completion]]
 """Gives the ways in which a filter may go on."""
 MOST_OFFERED = 8
+NOTICES_ABOVE = 4
+"""Lines of the prompt, the two of its verdict among them, and of the keys."""
 
 _LAST_WORD = re.compile(r"[A-Za-z_][\w.]*$")
 
@@ -83,8 +85,8 @@ class PromptField(Input):
         """A key behind the answer is no part of it: enter answers here, not when it has bubbled up to the bindings."""
         prompt = self.parent
         assert isinstance(prompt, Prompt)
-        if not prompt.is_asking:
-            prompt.hand_on(event)
+        if not prompt.is_open:
+            prompt.post_message(prompt.KeyBehind(event.key, event.character))
         elif event.key == "enter":
             prompt.answer(self.value)
         else:
@@ -111,9 +113,6 @@ class Prompt(Vertical):
             self.purpose = purpose
             self.text = text
 
-    class Heard(Message):
-        """Comes after `Answered`, when the screen has done what was asked for."""
-
     class Closed(Message):
         """The prompt was left."""
 
@@ -133,7 +132,6 @@ class Prompt(Vertical):
         self._complete: Complete | None = None
         self._before: Sequence[str] = ()
         self._at = 0
-        self._is_answered = False
         self._said: str | None = None  # in the line that judges
 
     def compose(self) -> ComposeResult:
@@ -153,7 +151,7 @@ class Prompt(Vertical):
     ) -> None:
         """Open with a text to edit; `hint` is shown while it is empty. `complete`: ways in which a filter may go on.
         `before`: what was answered earlier, the latest last."""
-        self.purpose, self._is_answered = purpose, False
+        self.purpose = purpose
         self._check, self._complete = check, AskedOnce(complete) if complete is not None else None
         self._before, self._at = before, len(before)
         field = self.query_one(Input)
@@ -163,6 +161,7 @@ class Prompt(Vertical):
         field.value = text
         field.cursor_position = len(text)
         self.display = True  # not by a class: the sheets would be matched to all that is in it
+        self._lift_notices(NOTICES_ABOVE)
         field.focus()
         self._judge(text)
 
@@ -170,11 +169,6 @@ class Prompt(Vertical):
     def is_open(self) -> bool:
         """Whether it is to be seen."""
         return self.display
-
-    @property
-    def is_asking(self) -> bool:
-        """Whether it waits for an answer."""
-        return self.is_open and not self._is_answered
 
     def on_input_changed(self, event: Input.Changed) -> None:
         """Judge every keystroke."""
@@ -215,17 +209,11 @@ class Prompt(Vertical):
         self.answer(event.value)
 
     def answer(self, text: str) -> None:
-        """Send the answer when it can be read; stay open when not."""
-        if not self.is_asking or self._judge(text):
-            return
-        self._is_answered = True
-        self.post_message(self.Answered(self.purpose, text))
-        self.post_message(self.Heard())
-
-    def hand_on(self, key: Key) -> None:
-        """Give a key to the screen, which has its keys again before it."""
-        self.close_answered()
-        self.post_message(self.KeyBehind(key.key, key.character))
+        """Send the answer when it can be read; stay open when not. What is asked for and that it is closed is drawn
+        at once."""
+        if self.is_open and not self._judge(text):
+            self.post_message(self.Answered(self.purpose, text))
+            self._close()
 
     def action_cancel(self) -> None:
         """Leave without an answer."""
@@ -235,11 +223,12 @@ class Prompt(Vertical):
         """Take the completion shown."""
         self.query_one(Input).action_cursor_right()
 
-    def close_answered(self) -> None:
-        """Close, unless it is closed, or open again and asks for something else."""
-        if self.is_open and self._is_answered:
-            self._close()
-
     def _close(self) -> None:
         self.display = False
+        self._lift_notices(1)
         self.post_message(self.Closed())
+
+    def _lift_notices(self, lines: int) -> None:
+        """Notices stand so many lines above the end of the screen: what is typed is not covered by them."""
+        for rack in self.screen.query("#textual-toastrack"):
+            rack.styles.margin = (0, 0, lines, 0)

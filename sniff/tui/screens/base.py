@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 from textual import events
 from textual.app import ComposeResult
+from textual.containers import Vertical
 from textual.messages import Layout
 from textual.reactive import Reactive
 from textual.screen import Screen
@@ -23,8 +24,14 @@ from sniff.tui.view_state import Viewing
 
 LOW = 18
 """Height below which the list gets what there is and what is said below it the least."""
+TALL = 24
+"""Height from which everything has room, a prompt too."""
 SMALL = (60, 16)
 """Below these columns or lines much is left out; that is said once."""
+
+
+class Foot(Vertical):
+    """The last lines: the prompt while it is open, and the keys. They stay in sight where there are few lines."""
 
 
 class ViewScreen(Screen[None]):
@@ -38,7 +45,7 @@ class ViewScreen(Screen[None]):
     TITLE: ClassVar[str] = ""
     LEGEND: ClassVar[tuple[tuple[str, str], ...]] = ()  # marks and titles of this screen, for its help page
     AUTO_FOCUS: ClassVar[str] = "#main"
-    VERTICAL_BREAKPOINTS: ClassVar[list[tuple[int, str]]] = [(0, "-low"), (LOW, "-high")]  # type: ignore[misc]
+    VERTICAL_BREAKPOINTS: ClassVar[list[tuple[int, str]]] = [(0, "-low"), (LOW, "-high"), (TALL, "-tall")]  # type: ignore[misc]
 
     focused: Reactive[Widget | None] = Reactive(None, repaint=False)
     """What has the keys. Who gets and who loses them is drawn anew; Textual draws the whole screen."""
@@ -55,8 +62,9 @@ class ViewScreen(Screen[None]):
         if analyzer(self).buses:
             yield BusBar()
         yield from self.compose_view()
-        yield Prompt()
-        yield KeyBar()
+        with Foot():
+            yield Prompt()
+            yield KeyBar()
 
     def compose_view(self) -> ComposeResult:
         """The widgets of the view; the one with the id "main" gets the focus."""
@@ -94,9 +102,9 @@ class ViewScreen(Screen[None]):
         self.viewing.is_small = is_small
 
     def on_layout(self, message: Layout) -> None:
-        """A scroll bar has its place from the list that it belongs to; Textual lays the screen out a second time when
-        one has become longer."""
-        if isinstance(message.widget, ScrollBar):
+        """These have their size from what they belong to or hold; Textual lays the screen out a second time when they
+        have got another one."""
+        if isinstance(message.widget, ScrollBar | Foot):
             message.stop()
             message.prevent_default()
 
@@ -114,10 +122,6 @@ class ViewScreen(Screen[None]):
     def keys_after_prompt(self) -> Widget:
         """What has the keys when the prompt is left."""
         return self.query_one(self.AUTO_FOCUS, Widget)
-
-    def on_prompt_heard(self) -> None:
-        """What was asked for is done: closing lays the screen out, and both are drawn at once."""
-        self.query_one(Prompt).close_answered()
 
     def on_prompt_closed(self) -> None:
         """Back to where the keys were, unless the prompt asks again; at once, for a key may follow."""

@@ -346,7 +346,10 @@ class FramesScreen(ListingScreen):
         self.set_class(pane is not None, "-zoomed")
         self.set_class(pane is self.lines, "-list-alone")
         for each in self._panes():
-            each.display = pane is None or each is pane
+            if pane is None:  # as the sheet says: a narrow screen has no room for the dump beside the fields
+                each.styles.clear_rule("display")
+            else:
+                each.display = each is pane
 
     def _panes(self) -> tuple[Widget, ...]:
         return self.lines, self.query_one(FieldTree), self.query_one(HexPane)

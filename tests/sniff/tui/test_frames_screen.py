@@ -140,6 +140,8 @@ def test_a_file_is_not_followed(look: Any, busy_bus: Any) -> None:
         busy_bus.ask(1)
         await see.poll()
         assert see.main.cursor == 1
+        await see.press("f")
+        assert see.notices() == ["a file stands still: there is nothing to follow"]
 
     look(busy_bus.store, script)
 

@@ -36,7 +36,7 @@ def test_a_prompt_asked_for_behind_an_answer_stays_open(look: Any, busy_bus: Any
         await see.type("5")
         await at_once(see, ("enter", "\r"), ("slash", "/"))
         prompt = see.app.screen.query_one(Prompt)
-        assert prompt.is_asking
+        assert prompt.is_open
         assert prompt.purpose == "filter"
         await see.type("dst == 1")
         await see.press("enter")
