@@ -206,7 +206,7 @@ class FramesScreen(ListingScreen):
     def action_error(self, direction: int) -> None:
         """Next or previous row that is trouble and that is shown."""
         store, lines = self.store, self.lines
-        no = lines.cursor
+        no, is_hidden = lines.cursor, False
         for _ in range(100_000):  # a filter may hide errors
             found = store.next_error(no) if direction > 0 else store.previous_error(no)
             if found is None or found > self.viewing.last_row:
@@ -214,8 +214,8 @@ class FramesScreen(ListingScreen):
             if found in lines.index:
                 lines.go_to(found)
                 return
-            no = found
-        self.notify("no error after this row" if direction > 0 else "no error before this row", timeout=2)
+            no, is_hidden = found, True
+        self.say_none("no error after this row" if direction > 0 else "no error before this row", is_hidden)
 
     def action_partner(self) -> None:
         """From request to response and back."""

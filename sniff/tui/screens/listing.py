@@ -228,6 +228,10 @@ class ListingScreen(SearchScreen):
         if not found:
             self.notify(f"{wanted!r} not found up to number {number}; the same key goes on", timeout=3, markup=False)
 
+    def say_none(self, words: str, is_hidden: bool) -> None:
+        """Say that there is none further on, or where some are hidden, none that passes the filter."""
+        self.notify(f"{words} passes the filter" if is_hidden and self.viewing.filter else words, timeout=2)
+
     def action_data(self) -> None:
         """Hide what only keeps a token-passing bus going, or show it again."""
         analyzer(self).filter("" if self.viewing.filter == DATA_ONLY else DATA_ONLY)

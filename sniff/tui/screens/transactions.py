@@ -58,9 +58,10 @@ class TransactionsScreen(ListingScreen):
 
     def action_error(self, direction: int) -> None:
         """Next or previous transaction that went wrong and that is shown."""
-        lines = self.lines
+        lines, is_hidden = self.lines, False
         for number in closings_in_trouble(self.store.kept, lines.cursor, direction):
             if number in lines.index:
                 lines.go_to(number)
                 return
-        self.notify("no trouble after this one" if direction > 0 else "no trouble before this one", timeout=2)
+            is_hidden |= number <= self.viewing.last_closed
+        self.say_none("no trouble after this one" if direction > 0 else "no trouble before this one", is_hidden)

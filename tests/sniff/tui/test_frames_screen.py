@@ -32,6 +32,14 @@ def test_errors_forth_and_back(look: Any, busy_bus: Any) -> None:
             found.append(see.main.cursor)
         assert found == [5, 6, 7, 8, 9, 9, 8, 7, 6, 5, 5]
         assert see.notices() == ["no error after this row", "no error before this row"]
+        see.app.filter("addr == 3")
+        await see.press("end", "e", "E", "2", "E", "e")
+        assert see.notices()[2:] == [
+            "no error after this row passes the filter",
+            "no error before this row passes the filter",
+            "no trouble before this one",
+            "no trouble after this one passes the filter",
+        ]
 
     look(busy_bus.store, script)
 
