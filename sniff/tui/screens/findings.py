@@ -13,7 +13,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
 from textual.widgets import DataTable, Static
 
-from dissectors.findings import Finding, Severity, under_causes
+from dissectors.findings import Finding, Severity, counted, under_causes
 from sniff.analysis.judging import rules_over
 from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.site_rules import SITE_RULES
@@ -65,6 +65,7 @@ class FindingsScreen(SearchScreen):
         self._open_end = False
         self._by_subject = False
         self._all = True
+        self._hidden = 0  # findings that are left out
         self._found: dict[str, Finding] = {}
         self._under: set[str] = set()  # keys of those that one above explains
         self._evidence: dict[str, int] = {}  # place in the evidence of each finding that was shown last
@@ -123,9 +124,9 @@ class FindingsScreen(SearchScreen):
         self._looked = time.monotonic()
         rules = {**rules_over(self.store.dissector), **SITE_RULES}
         self._titles = {code: rule.title for code, rule in rules.items()}
-        found = [
-            f for f in analyzer(self).findings() if self._all or f.severity >= Severity.WARNING or f.cause is not None
-        ]
+        known = analyzer(self).findings()
+        found = [f for f in known if self._all or f.severity >= Severity.WARNING or f.cause is not None]
+        self._hidden = len(known) - len(found)
         if self._by_subject:
             found.sort(key=lambda f: (f.subject, -f.severity, f.code))
         ordered = under_causes(found)
@@ -166,7 +167,8 @@ class FindingsScreen(SearchScreen):
         if open_end:
             text.append(f"{open_end}; more may be found, or found to be otherwise\n", style="yellow")
         if finding is None:
-            words.update(text if open_end else "nothing was found")
+            nothing = f"no error and no warning; i shows {counted(self._hidden, 'finding')} of less weight"
+            words.update(text if open_end else nothing if self._hidden else "nothing was found")
             advice.display = False
             places.update("")
             return
@@ -256,6 +258,8 @@ class FindingsScreen(SearchScreen):
         """With notes and infos, or without."""
         self._all = not self._all
         self._look()
+        if self._hidden:
+            self.notify("notes and infos are hidden: i shows them", timeout=2)
 
 
 def _keyed(found: Iterable[Finding]) -> dict[str, Finding]:

@@ -242,6 +242,8 @@ class PointsScreen(TableScreen):
 
     def _detail(self) -> str:
         point = self._here()
+        if point is None and (self._commands or self.words):
+            return sanitized(f"no such value · {self.said}") + self._more()
         if point is None:
             return "no values yet: they come from answered reads, confirmed writes and reports" + self._more()
         value, entry = point.sample.value, point.entry
@@ -260,6 +262,11 @@ class PointsScreen(TableScreen):
         words += _seen(point, guess, self.store.session.has_times)
         words.append(f"row {point.sample.frame}")
         return sanitized(" · ".join(word for word in words if word) + f" · {self.said}" + self._more())
+
+    @property
+    def said(self) -> str:
+        """With what is left out because nobody wrote it."""
+        return f"only commands (c: everything) · {super().said}" if self._commands else super().said
 
     def _more(self) -> str:
         hidden = getattr(self, "_hidden", 0)

@@ -229,7 +229,7 @@ class TimelineScreen(ViewScreen):
         words += self._answers(column, zoom) + f" · one column {seconds_in_words(zoom)}"
         if self._anchor is not None and chosen is not None:
             span = f"{clock(chosen[0] * NS_PER_S)[:8]} … {clock(chosen[1] * NS_PER_S)[:8]}"
-            words += f"\nselected: {span}; enter shows its frames, escape lets it go"
+            words = f"selected: {span}; enter shows its frames, escape lets it go\n{words}"  # the end may have no line
         return words
 
     def _answers(self, column: Column, zoom: int) -> str:

@@ -74,6 +74,15 @@ def test_facts_and_notes_can_be_left_out(look, store):
         await looking.press("i")
         assert "LN001" not in looking.text()
         assert "MB001" in looking.text()
+        assert looking.notices() == ["notes and infos are hidden: i shows them"]
+        shown = looking.app.shown
+        light = [one for one in store.findings() if one.severity < Severity.WARNING and one.cause is None]
+        looking.app.findings = lambda: light
+        shown._look()
+        await looking.settle()
+        assert "no error and no warning; i shows" in looking.text().replace("\n", " ")
+        await looking.press("6", "v")
+        assert any(line.strip().startswith("selected: ") for line in looking.lines())
 
     look(store, script)
 

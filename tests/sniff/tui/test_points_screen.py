@@ -85,6 +85,11 @@ def test_pin_bits_and_commands(look: Any) -> None:
         await see.press("b", "c")
         assert keys(see)
         assert all("→" in cells(see, key)[0] for key in keys(see))
+        assert "only commands (c: everything)" in see.text().replace("\n ", " ")
+        await see.press("slash")
+        await see.type("nowhere")
+        await see.press("enter")
+        assert "no such value · only commands" in see.text()
 
     look(store_of("modbus-rtu", 20), script, start="points")
 
