@@ -88,7 +88,7 @@ def test_bit_fields_share_their_octet(busy_bus: Any) -> None:
     assert found["sum"] == (5, 6)
 
 
-@pytest.mark.parametrize("size", [(80, 24), (120, 40), (300, 60)])
+@pytest.mark.parametrize("size", [(60, 12), (80, 24), (120, 40), (300, 60)])
 def test_times_of_a_ring_have_their_unit(look: Any, stores: dict[str, Store], size: tuple[int, int]) -> None:
     async def script(see: Any) -> None:
         titles = next(line for line in see.lines() if "loop" in line and "next" in line)
