@@ -31,6 +31,9 @@ NOBODY: Final = "nobody"
 PATIENCE: Final = NS_PER_S
 """ns; how long a master waits while that is not known."""
 
+NOISE: Final = 2 * NS_PER_S
+"""ns behind a damaged frame in which another one needs no cause of its own: contactors and motors disturb so long."""
+
 LASTS: Final = 3
 """Times the master's patience that a late answer may take."""
 
@@ -49,13 +52,15 @@ _KEPT = 256  # stations that are waited for, and senders in their windows
 class Window:
     """What came while the late answer of one station was due.
 
-    `opened`: how often it was waited for; `struck`, `whole`: frames by sender; `shown`: damaged ones that show that it
-    spoke; `silenced`: requests to others that nothing followed; `behind`: damaged requests directly behind the wait;
-    `own`: damaged answers of its own, as of one that answers into the repeat of what it was asked; `own_behind`: those
-    of them directly behind the wait.
+    `opened`: how often it was waited for; `waits_struck`: of them those into which something damaged came, not in the
+    middle of noise; `struck`, `whole`: frames by sender; `shown`: damaged ones that show that it spoke; `silenced`:
+    requests to others that nothing followed; `behind`: damaged requests directly behind the wait; `own`: damaged
+    answers of its own, as of one that answers into the repeat of what it was asked; `own_behind`: those of them
+    directly behind the wait.
     """
 
     opened: int = 0
+    waits_struck: int = 0
     own: int = 0
     own_behind: Tally = field(default_factory=Tally)
     behind: Tally = field(default_factory=Tally)
@@ -87,11 +92,13 @@ class Due:
 
 @dataclass(slots=True)
 class _Open:
-    """A window that is open. `in_a_row`: how often it was opened anew."""
+    """A window that is open. `in_a_row`: how often it was opened anew. `tells`: whether damage in it says something
+    of a station: one wait has one late answer, and noise that was there before it strikes what comes in it, too."""
 
     until: int
     lasts: int
     due: Due
+    tells: bool
     in_a_row: int = 0
 
 
@@ -104,6 +111,7 @@ class LateSpeakers:
         self.overdue = 0  # damaged frames while any answer was
         self.until = 0  # when all windows are closed again
         self._open: dict[int, _Open] = {}
+        self._noise_until = 0  # damage where no answer was due makes more of it likely up to then
         self._newest: int | None = None  # who was waited for in vain, while no other request has come
 
     def unanswered(self, station: int, due: Due, start: int, end: int, patience: int | None) -> None:
@@ -116,7 +124,7 @@ class LateSpeakers:
         self._window(station).opened += 1
         self._newest = station
         self._open.pop(station, None)  # the one that was not waited for the longest is the first to go
-        self._open[station] = _Open(end + lasts, lasts, due)
+        self._open[station] = _Open(end + lasts, lasts, due, start >= self._noise_until)
         if len(self._open) > _OPEN_KEPT:
             del self._open[next(iter(self._open))]
         self.until = max(self.until, end + lasts)
@@ -139,8 +147,7 @@ class LateSpeakers:
         if self._newest is not None and start < self.until:
             self._window(self._newest).behind.add(start, *rows)
             self._newest = None
-        due = self._due(start)
-        self.overdue += bool(due)
+        due = self._struck_while_due(start)
         for other in due:
             self._strike(other, MASTER, start, rows, self._open[other].due.is_shown_by(octets, is_answer=False))
 
@@ -154,8 +161,7 @@ class LateSpeakers:
             if self._newest == station:
                 self._window(station).own_behind.add(start, *rows)
             self._newest = None
-        due = self._due(start)
-        self.overdue += bool(due)
+        due = self._struck_while_due(start)
         for other in due:
             self._window(other).whole[MASTER] += 1
             if other != station:
@@ -168,8 +174,7 @@ class LateSpeakers:
     def noise(self, start: int, *rows: int | None) -> None:
         """Octets that are no frame, where nobody was asked for an answer."""
         self.damaged[NOBODY] += 1
-        due = self._due(start)
-        self.overdue += bool(due)
+        due = self._struck_while_due(start)
         for other in due:
             self._strike(other, NOBODY, start, rows, is_shown=False)
 
@@ -191,6 +196,14 @@ class LateSpeakers:
             return []
         return [station for station, one in self._open.items() if start < one.until]
 
+    def _struck_while_due(self, start: int) -> list[int]:
+        """Whose late answers are due where something is damaged."""
+        due = self._due(start)
+        self.overdue += bool(due)
+        if not due:
+            self._noise_until = start + NOISE
+        return due
+
     def _go_on(self, station: int, start: int) -> None:
         """It was asked in its own window: what came may be its answer to an earlier request."""
         one = self._open[station]
@@ -200,8 +213,10 @@ class LateSpeakers:
             self.until = max(self.until, one.until)
 
     def _strike(self, station: int, sender: str, start: int, rows: tuple[int | None, ...], is_shown: bool) -> None:
-        window = self._window(station)
+        window, one = self._window(station), self._open[station]
         window.damage.add(start, *rows)
+        window.waits_struck += one.tells
+        one.tells = False
         if sender in window.struck or len(window.struck) < _KEPT:
             window.struck[sender] += 1
             window.shown[sender] += is_shown
@@ -326,12 +341,13 @@ def _judge(
     chance = at_least(struck, struck + elsewhere, of / (of + of_elsewhere)) if struck else 1.0
     shown = window.shown.total()
     is_shown = shown >= _SHOWN and 2 * shown >= window.damage.count
-    is_sure = is_shown or (struck >= _LEAST and _is_seldom(chance, late))
-    hit = (hit if is_sure else set()) | (
-        {sender for sender in only_here if window.struck[sender]}
-        if is_shown
-        else _standing_out(window, only_here, late)
-    )
+    is_often = window.waits_struck >= _LEAST
+    is_sure = is_shown or (is_often and struck >= _LEAST and _is_seldom(chance, late))
+    hit = hit if is_sure else set()
+    if is_shown:
+        hit |= {sender for sender in only_here if window.struck[sender]}
+    elif is_often:
+        hit |= _standing_out(window, only_here, late)
     if sum(window.struck[sender] for sender in hit) < _LEAST:
         return None
     silenced = frozenset(

@@ -90,7 +90,31 @@ def test_of_many_that_are_waited_for_one_has_the_most_damage_in_its_windows(wait
     late, name = LateSpeakers(), "station 1"
     late.windows = {100 + at: Window() for at in range(1, waited_for)}
     whole = Counter({name: 109, MASTER: 115})
-    late.windows[9] = Window(60, damage=Tally(6, 0, 9, [7]), struck=Counter({name: 6}), whole=whole)
+    late.windows[9] = Window(60, 6, damage=Tally(6, 0, 9, [7]), struck=Counter({name: 6}), whole=whole)
     late.damaged = Counter({name: 7})
     told = list(late_speakers(late, {name: 445}, {9: Heard(5, 0, 60)}))
     assert bool(told) is is_told
+
+
+def test_noise_into_a_wait_is_nobodys_late_answer() -> None:
+    """In each of three bursts of noise the answer of station 9 is lost, and what comes behind it is damaged: all that
+    ever is, but for what began the burst."""
+    late, now = LateSpeakers(), 0
+    for _ in range(3):
+        now += 3600 * 1000 * MS
+        late.damaged_answer(2, "station 2", b"", now, 1, is_longer=False)
+        late.unanswered(9, Due(), now + 60 * MS, now + 68 * MS, WAIT)
+        for turn in range(3):
+            late.damaged_answer(1, "station 1", b"", now + WAIT + (100 + 60 * turn) * MS, 1, is_longer=False)
+    whole = {"station 1": 30_000, "station 2": 30_000, MASTER: 60_000}
+    assert late.windows[9].damage.count == 9
+    assert not list(late_speakers(late, whole, {9: Heard(30_000, 0, 3)}))
+
+
+def test_one_wait_has_one_late_answer() -> None:
+    late = LateSpeakers()
+    late.unanswered(9, Due(), 0, 8 * MS, WAIT)
+    for turn in range(6):
+        late.damaged_answer(1, "station 1", b"", WAIT + 60 * turn * MS, 1, is_longer=False)
+    whole = {"station 1": 30_000, MASTER: 60_000}
+    assert not list(late_speakers(late, whole, {9: Heard(30_000, 0, 1)}))
