@@ -73,11 +73,11 @@ _ALL = (
         Severity.WARNING,
         "answers into what comes next",
         "Damage that stands directly behind waits for one station in vain, behind at least three that did not begin in "
-        "noise, and far more often there than in frames of the same senders elsewhere (chance under 1 in 500). An answer after the master's "
-        "timeout falls on the next request or on the answer to it, and two senders at once are no frame. Or damage "
-        "that begins as its answer where others were asked, or answers that are longer than they can be and not over "
-        "when the master's timeout is. Where nearly all damage stands there, but so little that chance may have put it "
-        "there, the bus is told of and nobody named.",
+        "noise, and far more often there than in frames of the same senders elsewhere (chance under 1 in 500). An "
+        "answer after the master's timeout falls on the next request or on the answer to it, and two senders at once "
+        "are no frame. Or damage that begins as its answer where others were asked, or answers that are longer than "
+        "they can be and not over when the master's timeout is. Where nearly all damage stands there, but so little "
+        "that chance may have put it there, the bus is told of and nobody named.",
         "the station answers when its master has given up; those whose frames are hit are not to blame",
         "raise the master's response timeout, or find out why this station is slow; nobody else's cable",
         explains=(

@@ -80,9 +80,9 @@ RULES: dict[str, Rule] = {
             "two masters",
             "Commands that begin in the middle of another one, or follow one within 100 ms and sooner than the station "
             "asked ever answered; answers in their usual time, within 100 ms, and yet after the next command. No "
-            "master does that. At least two such; or at least three damaged commands within 100 ms behind one that "
-            "nothing followed, far more than of all commands, or five other commands, sooner behind it than three in "
-            "four come behind an answer (chance under 1 in 500).",
+            "master does that. At least two such, and one for 20 damaged commands; or at least three damaged commands "
+            "within 100 ms behind one that nothing followed, far more than of all commands, or five other commands, "
+            "sooner behind it than three in four come behind an answer (chance under 1 in 500).",
             "two masters on one bus, or a commissioning tool beside the controller",
             "find the second master and take it off",
             explains=(

@@ -37,6 +37,7 @@ ALIKE_OFF = 6
 TRIES = 11
 """Most commands of one turn to a station: a first one and the most retries that an NAE can be given (3 to 10)."""
 
+_OF_DAMAGE = 20  # damaged commands for each thing that one master would not do: noise makes some look so
 _INTO_ANSWERS = 3
 _SELDOM = 0.002
 
@@ -94,7 +95,7 @@ class N2Evidence:
 def worded(heard: N2Evidence) -> Iterator[Finding]:
     """All findings: the bus first, then station by station."""
     masters = heard.masters
-    if masters.seen.count >= 2:
+    if masters.seen.count >= 2 and _OF_DAMAGE * masters.seen.count >= heard.master.bad.count:
         seen = f"{masters.seen.count} times what one master would not do: a command in the middle of another one, "
         seen += "or before its answer can have come"
         yield masters.seen.found(RULES["N2007"], "bus", seen)

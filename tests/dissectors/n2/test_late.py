@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from dissectors.frame import Chunk
-from dissectors.line import MS
+from dissectors.line import MS, Timing
 from dissectors.n2.envelope import make_answer, make_command
+from dissectors.n2.findings import N2Findings
 from dissectors.n2.masters import Masters
 from dissectors.n2.record import N2StationRecord
 from dissectors.tracker import Interval, Transaction, Verdict
@@ -83,3 +84,14 @@ def test_an_answer_that_ends_a_cut_echo_by_chance_shows_no_second_master() -> No
             now += silence * MS + len(octets) * LINE.char
             chunks.append(Chunk(now, octets))
     assert "N2007" not in {code for code, _ in warned_of(chunks)}
+
+
+@pytest.mark.parametrize(("spoilt", "is_told"), [(0, True), (60, False)])
+def test_of_many_spoilt_commands_some_seem_to_be_in_the_middle_of_another(spoilt: int, is_told: bool) -> None:
+    """A flipped bit makes a `>` in noise: over a night twice."""
+    judge = N2Findings(Timing(LINE))
+    for no in range(2):
+        judge.masters.seen.add(no, no)
+    for no in range(spoilt):
+        judge.master.add_bad(no, no)
+    assert ("N2007" in {one.code for one in judge.findings()}) is is_told
