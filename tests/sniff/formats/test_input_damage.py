@@ -14,6 +14,7 @@ from sniff.engine.session import Item
 from sniff.formats import read
 from sniff.formats.bytelog import ByteLog
 from sniff.formats.text import parse
+from tests.seeds import in_turn
 from tests.sniff.formats.written_anew import write_anew
 
 TEXT = """\
@@ -174,7 +175,7 @@ def test_a_byte_log_with_any_octet_changed(name: str, tmp_path: Path) -> None:
     for at in range(len(text)):
         if (whole := whole_lines(text, at)) != lines_before:
             lines_before, (before, _, _) = whole, read_log(path, whole)
-        for change in CHANGES[::2]:
+        for change in in_turn(CHANGES[::2], at, 2):
             found, as_kind, said = read_log(path, text[:at] + change + text[at + 1 :])
             if as_kind == kind == "CSV":  # its rows are put in order of time
                 assert all(item in found for item in before)

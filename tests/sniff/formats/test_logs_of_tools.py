@@ -11,6 +11,7 @@ from sniff.analysis.told_protocol import detected
 from sniff.bus.offline import settled
 from sniff.engine.capture import CaptureError
 from sniff.formats import read
+from tests.seeds import IS_SEARCH
 from tests.sniff.formats.written_anew import write_anew
 
 LOGS = Path(__file__).parents[3] / "captures" / "logs"
@@ -77,7 +78,7 @@ def test_logs_cut_anywhere(name: str, tmp_path: Path) -> None:
     whole = (LOGS / name).read_bytes()
     expected = b"".join(frames_of(LOGS / name))
     path = tmp_path / name
-    cuts = min(12, max(3, 30_000 // len(whole)))
+    cuts = min(12 if IS_SEARCH else 6, max(3, 30_000 // len(whole)))
     for end in range(0, len(whole), max(1, len(whole) // cuts)):
         write_anew(path, whole[:end])
         try:
