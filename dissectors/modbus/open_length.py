@@ -33,6 +33,7 @@ _UNPREDICTED: Final = frozenset(range(256)) - {
 }
 """Function octets behind which a frame may begin whose length nothing predicts."""
 
+_CHECK: Final = 2
 _SETTLING: Final = 0xFF
 _MOST_BEGINS: Final = 32
 _INITIAL: Final = 0xFFFF
@@ -201,10 +202,21 @@ def settled_end(known: bytes, at: int) -> int:
 
 def _is_agreed(known: bytes, at: int, after: int) -> bool:
     """Whether what stands at `after` says that the frame which begins at `at` ends there."""
-    if _same(known, at, after) or _begins_exchange(known, after):
+    if _same(known, at, after) or _begins_exchange(known, after) or _asks_on(known, at, after):
         return True
     beyond = _beyond(known, after)
     return beyond > after and _same(known, at, beyond)
+
+
+def _asks_on(known: bytes, at: int, after: int) -> bool:
+    """Whether another station is asked for the same there, in as many octets: a master that looks who is there."""
+    end = 2 * after - at
+    return (
+        end <= len(known)
+        and known[at + 1 : after - _CHECK] == known[after + 1 : end - _CHECK]
+        and _opens(known, after)
+        and not crc16_modbus(known[after:end])
+    )
 
 
 def _beyond(known: bytes, at: int) -> int:
