@@ -59,6 +59,9 @@ MOST_STRANGE = 0.2
 _SAYS = 30
 """Lines by which such a text is told."""
 
+_NUMBER_COLUMN = re.compile(r"\s*[\"']?#[\"']?\s*[,;\t|]")
+"""The first heading of a table that numbers its rows, which is no remark."""
+
 _RULED = re.compile(r"[\s+|:=-]*")
 """What stands between the rows of a table that is drawn."""
 
@@ -345,7 +348,7 @@ class _Counts:
 def _heading(lines: list[str]) -> tuple[int, TableLayout] | None:
     """The line with the headings of a table and what it says; remarks may stand before it."""
     for number, line in enumerate(map(plain_signs, lines[:20])):
-        if not line.strip() or line.lstrip().startswith(REMARK):
+        if not line.strip() or (line.lstrip().startswith(REMARK) and not _NUMBER_COLUMN.match(line)):
             continue
         below = lines[number + 1 : number + 500]
         table = heading_of(line, delimiter_of(line), below)

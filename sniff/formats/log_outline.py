@@ -15,7 +15,7 @@ from sniff.formats.log_lines import Kind, Line, key_of, label_of, way_of, withou
 from sniff.formats.log_octets import octets_in
 from sniff.formats.log_pieces import LONGEST, SPACES
 from sniff.formats.log_shapes import COLOURS, STAMP, WAYS, Role
-from sniff.formats.log_spellings import CHARACTERS, ENDS, H2, ended
+from sniff.formats.log_spellings import CHARACTERS, ENDS, H2, NUMBERED, SHOWN, ended, numbered_characters
 from sniff.formats.log_times import Times
 
 LEAST = 2
@@ -30,13 +30,16 @@ _SHORT = {
     "0x and digits": re.compile(r"(?<![0-9A-Za-z_])0[xX][0-9A-Fa-f]{1,2}(?![0-9A-Za-z_])"),
     "pairs in brackets": re.compile(rf"\[{H2}\]|<{H2}>|\({H2}\)|\{{{H2}\}}"),
     "digits and h": re.compile(rf"(?<![0-9A-Za-z_]){H2}[hH](?![0-9A-Za-z_])"),
+    "digits after a sign": re.compile(r"(?<![0-9A-Za-z_])(?:&H[0-9A-Fa-f]{1,2}|[$%&#][0-9A-Fa-f]{2})(?![0-9A-Za-z_])"),
+    "digits behind 16#": re.compile(r"(?<![0-9A-Za-z_#])16#[0-9A-Fa-f]{1,2}(?![0-9A-Za-z_])"),
+    NUMBERED: re.compile(rf"(?:(?<=\s)|^)(?:{SHOWN}) \((?:\d{{3}}|[0-9a-f]{{2}})\)"),
     CHARACTERS: re.compile(rf"(?<![0-9A-Za-z_])(?:[:>][0-9A-F]+|[AN][0-9A-F]*){ENDS}(?![0-9A-Za-z_])"),
 }
 """Spelling → octets of a line that has few."""
 _SIGNED = frozenset(("0x and digits", "pairs in brackets", CHARACTERS))
 """Spellings that are octets wherever they stand."""
 _DECIMAL = re.compile(r"(?<![0-9A-Za-z_.])\d{1,3}(?![0-9A-Za-z_])")
-_NUMERAL = re.compile(r"\d+")
+_NUMERAL = re.compile(r"0[xX][0-9A-Fa-f]+|\d+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,11 +82,22 @@ def _short_line(stamp: Stamp | None, text: str, outlines: frozenset[Outline]) ->
     for spelling in sorted({outline.spelling for outline in outlines}):
         for match in _short(spelling).finditer(text):
             octets = _octets(match[0], spelling)
-            if octets and _outline(spelling, text, *match.span(), octets) in outlines:
+            if octets and _outlined(spelling, text, *match.span(), octets) & outlines:
                 label, lead = label_of(text[: match.start()]), text[: match.start()]
                 bare = not label and STAMP not in lead
                 return Line(Kind.OCTETS, stamp, way_of(lead), octets, label, bare, Role.DATA, spelling=spelling)
     return None
+
+
+def _outlined(spelling: str, text: str, begin: int, end: int, octets: bytes) -> frozenset[Outline]:
+    """The outline of a line, and the one that it has without the number of its octets, where that is taken away."""
+    without = re.sub(rf"(?<![0-9A-Za-z]){len(octets)}(?=[\s:;,|]*$)", "", text[:begin])
+    return frozenset(
+        (
+            _outline(spelling, text, begin, end, octets),
+            _outline(spelling, without + text[begin:], len(without), len(without) + end - begin, octets),
+        )
+    )
 
 
 def _plain(text: str) -> str:
@@ -109,7 +123,9 @@ def _octets(text: str, spelling: str) -> bytes:
         return ended(text)
     if spelling.startswith("numbers"):
         return bytes((int(text),)) if int(text) < 256 else b""
-    digits = re.sub(r"0[xX]|[^0-9A-Fa-f]", "", text)
+    if spelling == NUMBERED:
+        return numbered_characters(text)
+    digits = re.sub(r"0[xX]|16#|[^0-9A-Fa-f]", "", text)
     return bytes.fromhex(digits if len(digits) % 2 == 0 else f"0{digits}")
 
 

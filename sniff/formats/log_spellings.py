@@ -115,6 +115,7 @@ def _escapes_alone(text: str) -> bytes:
 
 
 CHARACTERS = "frames as characters"
+NUMBERED = "characters with their numbers"
 ENDS = r"(?:<CR>|<LF>|\\r|\\n)*"
 _END = re.compile(r"(?:<CR>|<LF>|\\r|\\n|\r|\n)+$")
 
@@ -167,7 +168,7 @@ def _codes(text: str) -> bytes:
     return bytes(int(token) for token in tokens)
 
 
-def _numbered_characters(text: str) -> bytes:
+def numbered_characters(text: str) -> bytes:
     """Characters or their names, each with its number behind it: `<SOH> (001) k (107)`, or `k (6b)`."""
     found = bytearray()
     for name, character, number in re.findall(r"(?:<([A-Z0-9]{2,5})>|(\S)) \(([0-9a-f]{2,3})\)", text):
@@ -196,7 +197,7 @@ def _controls(text: str) -> bytes:
 H2 = r"[0-9A-Fa-f]{2}"
 _BESIDE = r"(?:\((?:0b)?[0-9]{1,8}\)|\[(?:0b)?[0-9]{1,8}\]|/[0-9]{1,3}|\('.'\)|'.')"
 _ESCAPES = rf"(?:\\x{H2}|\\[abtnvfr0\\])"
-_SHOWN = r"<[A-Z0-9]{2,5}>|\S"
+SHOWN = r"<[A-Z0-9]{2,5}>|\S"
 _CONTROL = rf"<(?:{'|'.join(_NAMED)})>"
 _HEX = _by(H2, 16)
 
@@ -209,8 +210,8 @@ SPELLINGS: tuple[Spelling, ...] = (
     Spelling("byte strings", rf"(?:b|bytearray\(b)?{ESCAPED_STRING}(?:(?!(?P=q))[^\\]|\\.)*(?P=q)", None, _escaped, 1,
              before=r"(?<![0-9A-Za-z_])", after=""),
     Spelling("escapes", _ESCAPES, r"[ ,]?", _escapes_alone, 2, before=""),
-    Spelling("characters with their numbers", rf"(?:{_SHOWN}) \((?:\d{{3}}|[0-9a-f]{{2}})\)", " ",
-             _numbered_characters, 2, before=r"(?:(?<=\s)|^)", after=""),
+    Spelling(NUMBERED, rf"(?:{SHOWN}) \((?:\d{{3}}|[0-9a-f]{{2}})\)", " ",
+             numbered_characters, 2, before=r"(?:(?<=\s)|^)", after=""),
     Spelling("pairs in brackets", rf"(?:\[{H2}\]|<{H2}>|\({H2}\)|\{{{H2}\}})", r"[ ,]?", _HEX, 2, before="",
              after=""),
     Spelling("names of controls", rf"[!-;=?-~]*{_CONTROL}", r"", _controls, 2, after="[!-;=?-~]*",

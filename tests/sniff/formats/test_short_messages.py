@@ -10,6 +10,7 @@ import pytest
 
 from dissectors.frame import Chunk
 from sniff.formats import read
+from sniff.formats.log_spellings import CONTROLS
 
 FIELD = [bytes.fromhex(digits) for digits in (
     "DC0101", "DC0102", "6805058F82025A046D16", "E5", "10030249 4E16", "E5", "010302", "DC0201", "6807070381463A3E0200 4416",
@@ -21,12 +22,19 @@ TEXT = [b">01FA7\r", b"A10617\r", b">0104C5\r", b"A\r", b">0104C5\r", b"A0042910
 ASCII = [b":010325200004B3\r\n", b":010308002400000000000000D0\r\n"] * 4
 
 
+NAMES = {code: f"<{name}>" for code, name in enumerate([*CONTROLS, "SPACE"])}
+
+
 def hx(octets: bytes, between: str = " ", form: str = "{:02X}") -> str:
     return between.join(form.format(octet) for octet in octets)
 
 
 def shown(octets: bytes) -> str:
     return "".join(chr(octet) if 0x20 <= octet < 0x7F else "." for octet in octets)
+
+
+def numbered(octet: int) -> str:
+    return f"{chr(octet) if 0x20 < octet < 0x7F else NAMES.get(octet, '?')} ({octet:03d})"
 
 
 def dump(octets: bytes) -> str:
@@ -55,6 +63,12 @@ KINDS: dict[str, Written] = {
     "digits behind a comma": lambda i, o: f"2026/03/14 10:00:{i:02d},{o.hex().upper()}\n",
     "colons": lambda i, o: f"[10:00:{i:02d}.512][D][uart_debug:114]: {'>>>' if i % 2 else '<<<'} {hx(o, ':')}\n",
     "decimals": lambda i, o: f"[10:00:{i:02d}][D][uart:1]: {'>>>' if i % 2 else '<<<'} {hx(o, ',', '{}')}\n",
+    "number and characters": lambda i, o: f"10:00:{i:02d}.512\t{way(i)}\t{len(o)}\t{hx(o)}\t{shown(o)}\n",
+    "number ahead of small digits": lambda i, o: f"{i:5d}   {i / 8:.6f}  DTE → DCE  Modbus/RTU {len(o)} {o.hex(' ')}\n",
+    "&H": lambda i, o: f"{way(i)}: {hx(o, ' ', '&H{:02X}')}\n",
+    "16#": lambda i, o: f"{way(i)}: {hx(o, ', ', '16#{:02X}')}\n",
+    "characters with numbers": lambda i, o: f"Host --> {' '.join(map(numbered, o))} \n",
+    "sum behind": lambda i, o: f"DATE=2026-03-14T10:00:{i:02d}.512;FRAME={hx(o, '-')};CRC=OK;CRC_VAL=0x{sum(o):04X};\n",
     "decimals on lines": lambda i, o: f'{{"t": {i}, "data": [\n' + ",\n".join(f" {octet}" for octet in o) + "\n]}\n",
 }  # fmt: skip
 
