@@ -71,3 +71,14 @@ def without_check(finding: Finding, flaw: Flaw) -> Finding:
         "before the check is out",
         next="whether that program has to append the CRC itself; else its turnaround, its direction control",
     )
+
+
+def of_two(finding: Finding, count: int) -> Finding:
+    """The finding of damage of which much has more octets than an answer: noise makes none, two senders at once do."""
+    return replace(
+        finding,
+        seen=f"{finding.seen}; {count} have more octets than they can have",
+        means="two at once: this station answers late, into what the master sends next or its own next answer, or "
+        f"somebody talks over it; or {finding.means}",
+        next=f"its slowest answer against the master's timeout, and what else speaks then; {finding.next}",
+    )

@@ -12,7 +12,7 @@ from dissectors.late_speakers import reaching
 from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.exception_meanings import EXCEPTIONS, MAKER_EXCEPTION, USED_ALIKE, VENDOR_EXCEPTION
-from dissectors.modbus.finding_words import note_if, of_few, request_words, share_words, without_check
+from dissectors.modbus.finding_words import note_if, of_few, of_two, request_words, share_words, without_check
 from dissectors.modbus.functions import EXCEPTIONS as EXCEPTION_NAMES
 from dissectors.modbus.header import code_number
 from dissectors.modbus.response_groups import AnsweredRequest
@@ -186,6 +186,8 @@ def _damaged(seen: BusRecord, unit: int, station: StationRecord, is_common: bool
         words += f"; that is {share_words(damaged.count, station.asked)} of all, with 95% confidence"
     finding = damaged.found(RULES["MB005"], name, words, note_if(rare or is_common))
     finding = of_few(finding) if damaged.count < _SYSTEM_LEAST else finding
+    if station.talked_over.count > 1 and 2 * station.talked_over.count >= damaged.count:
+        finding = of_two(finding, station.talked_over.count)
     if damaged.count >= _NEARLY_ALL_LEAST and 10 * damaged.count >= 9 * station.asked:  # noise leaves some
         means = f"{finding.means}; or two stations with this address, whose answers fall on each other"
         following = f"switch the station off and see whether something still answers; {finding.next}"

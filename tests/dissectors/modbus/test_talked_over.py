@@ -6,6 +6,7 @@ import pytest
 
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.bus_record import BusRecord
+from dissectors.modbus.rules_station import of_station
 from dissectors.modbus.station_record import StationRecord
 from dissectors.modbus.talked_over import second_voice
 
@@ -34,3 +35,16 @@ def second_voices(*stations: tuple[int, int], excess: int = 4) -> set[int]:
 )
 def test_who_has_a_second_station(stations: tuple[tuple[int, int], ...], who: set[int]) -> None:
     assert second_voices(*stations) == who
+
+
+@pytest.mark.parametrize(("longer", "is_of_two"), [(2, True), (3, True), (1, False), (0, False)])
+def test_damage_with_octets_too_many_is_not_put_down_to_noise_alone(longer: int, is_of_two: bool) -> None:
+    seen = BusRecord(Timing(LineSettings()))
+    seen.stations[17] = station = StationRecord(asked=91, answered=80, excess=[4] * longer)
+    for no in range(3):
+        station.damaged.add(no, no)
+        if no < longer:
+            station.talked_over.add(no, no)
+    (told,) = (one for one in of_station(seen, 17, station, None, is_common=False) if one.code == "MB005")
+    assert ("two at once" in told.means) is is_of_two
+    assert (f"{longer} have more octets" in told.seen) is is_of_two
