@@ -186,8 +186,8 @@ def _damaged(seen: BusRecord, unit: int, station: StationRecord, is_common: bool
         words += f"; that is {share_words(damaged.count, station.asked)} of all, with 95% confidence"
     finding = damaged.found(RULES["MB005"], name, words, note_if(rare or is_common))
     finding = of_few(finding) if damaged.count < _SYSTEM_LEAST else finding
-    if station.talked_over.count > 1 and 2 * station.talked_over.count >= damaged.count:
-        finding = of_two(finding, station.talked_over.count)
+    if (longer := station.talked_over.count - station.cut) > 1 and 2 * longer >= damaged.count:
+        finding = of_two(finding, longer)
     if damaged.count >= _NEARLY_ALL_LEAST and 10 * damaged.count >= 9 * station.asked:  # noise leaves some
         means = f"{finding.means}; or two stations with this address, whose answers fall on each other"
         following = f"switch the station off and see whether something still answers; {finding.next}"
