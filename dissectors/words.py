@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dissectors.line import MS, NS_PER_S
 
-_MINUTES_FROM = 300 * NS_PER_S
+_MINUTES_FROM, _HOURS_FROM = 300 * NS_PER_S, 300 * 60 * NS_PER_S
 _EXACT = 1 << 53
 
 
@@ -25,10 +25,12 @@ def fine_milliseconds(value: int) -> str:
 
 
 def duration(value: int) -> str:
-    """A duration in ns in three digits and the unit that fits: "1.75 ms", "12.0 s", "15.0 min"."""
+    """A duration in ns in three digits and the unit that fits: "1.75 ms", "12.0 s", "15.0 min", "11.5 h"."""
     if value < NS_PER_S:
         return fine_milliseconds(value)
     seconds = value / NS_PER_S
+    if value >= _HOURS_FROM:
+        return f"{_three_digits(seconds / 3600)} h"
     return f"{_three_digits(seconds)} s" if value < _MINUTES_FROM else f"{_three_digits(seconds / 60)} min"
 
 

@@ -38,7 +38,8 @@ ANSWER_RULES = (
         Severity.ERROR,
         "fell silent",
         "A station that used to answer left at least its last five requests without an answer, to the end. A warning "
-        "where it was heard again, and nine tenths of all that it left unanswered stand in that row.",
+        "where it was heard again, and nine tenths of all that it left unanswered stand in that row, or in several "
+        "with 20 answers for each.",
         "the station was switched off, crashed or lost its connection at that time",
         "what happened at the time of the last answer; supply, fuse and connector of the station",
         explains=("MB002", "MB104", "MB105"),

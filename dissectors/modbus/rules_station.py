@@ -18,14 +18,11 @@ from dissectors.modbus.header import code_number
 from dissectors.modbus.response_groups import AnsweredRequest
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.rules_foreign import foreign_answers
-from dissectors.modbus.station_record import STRAY, Key, Requested, StationRecord
+from dissectors.modbus.station_record import AWAY_LEAST, STRAY, Key, Requested, StationRecord
 from dissectors.modbus.struck_octet import falls_there_by_chance
 from dissectors.modbus.talked_over import second_voice
 from dissectors.words import duration, fine_milliseconds, percent
 from dissectors.wrong_checks import Habit
-
-SILENT_AT_END = 5
-"""Unanswered requests in a row to the end, from which on a station that used to answer has fallen silent."""
 
 FLAWS = {
     Flaw.CHECK_SWAPPED: "MB011",
@@ -37,8 +34,8 @@ FLAWS = {
 }
 """The rule about each kind of damage that is always the same."""
 
-_AWAY_SHARE = 0.9
-"""So much of what a station left unanswered stands in one row where it was away."""
+_AWAY_SHARE, _ANSWERED_BETWEEN = 0.9, 20
+"""So much of what a station left unanswered stands in rows where it was away; and of several, answers for each."""
 
 SPOILT = (Flaw.FIRST_SPOILT, Flaw.LAST_SPOILT)
 """Those that noise makes as well; it takes no octet away."""
@@ -101,12 +98,12 @@ def of_missing(seen: BusRecord, unit: int, station: StationRecord, is_scanned: b
                 yield missing.found(RULES["MB001"], name, words, Severity.NOTE)
         return
     silent = station.silent
-    if silent.count >= SILENT_AT_END and station.answered and station.last_heard is not None:
+    if silent.count >= AWAY_LEAST and station.answered and station.last_heard is not None:
         since = seen.now - station.last_heard
         words = f"no answer to its last {silent.count} requests; last heard {duration(since)} before the end"
         yield silent.found(RULES["MB003"], name, words)
     ignored = [(key, request) for key, request in sorted(station.requests.items(), key=str) if _is_ignored(request)]
-    if station.answered >= 3 and silent.count < SILENT_AT_END:
+    if station.answered >= 3 and silent.count < AWAY_LEAST:
         for key, request in ignored:
             if 10 * request.echoed >= 9 * request.tries:
                 words = f"{counted(request.tries, 'request')} to {request_words(key)}, all given back whole"
@@ -117,12 +114,13 @@ def of_missing(seen: BusRecord, unit: int, station: StationRecord, is_scanned: b
     else:
         ignored = []
     explained = sum(request.missing.count for _, request in ignored)
-    if silent.count >= SILENT_AT_END and station.answered:
+    if silent.count >= AWAY_LEAST and station.answered:
         explained += silent.count
     left = missing.count - explained
     if left > 0:
         away = station.away
-        if station.answered and away.count >= SILENT_AT_END and _AWAY_SHARE * left <= away.count <= left:
+        between = _ANSWERED_BETWEEN * station.times_away if station.times_away > 1 else 1
+        if station.answered >= between and away.count >= AWAY_LEAST and _AWAY_SHARE * left <= away.count <= left:
             yield _was_away(name, station)
             left -= away.count
     if left > 0:
@@ -132,11 +130,13 @@ def of_missing(seen: BusRecord, unit: int, station: StationRecord, is_scanned: b
 
 
 def _was_away(name: str, station: StationRecord) -> Finding:
-    """A station that left nearly all that it left unanswered in one row, and was heard again: no single frames were
-    lost, and no damage of the line explains it."""
-    away = station.away
-    words = f"no answer to {away.count} of {counted(station.asked, 'request')}, in a row within "
-    words += f"{duration(away.last - away.first)}; then it answered again"
+    """A station that left nearly all that it left unanswered in a row, or a few, and was heard again: no single frames
+    were lost, and no damage of the line explains it."""
+    away, often = station.away, station.times_away
+    long, of = duration(station.away_for), counted(station.asked, "request")
+    rows = f"a row within {long}; then it answered again"
+    rows = f"{often} rows of {long} in all; it was heard again each time" if often > 1 else rows
+    words = f"no answer to {away.count} of {of}, in {rows}"
     return replace(
         away.found(RULES["MB003"], name, words, Severity.WARNING),
         means="the station was off, restarted or cut off for that time",

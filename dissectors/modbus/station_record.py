@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from dissectors.findings import Tally
+from dissectors.findings import Tally, together
 from dissectors.frame import Flaw
 from dissectors.modbus.garbage import Garbage
 from dissectors.modbus.pairing import is_answer
@@ -21,6 +21,9 @@ KEYS_KEPT = 512
 
 SAME_KEPT = 8
 """Requests of a station whose answers are compared with each other."""
+
+AWAY_LEAST = 5
+"""Unanswered requests in a row of one that is not there for a while; fewer get lost."""
 
 _BLOCKS = 64
 _NEARLY_ALL = 4  # of five
@@ -157,15 +160,17 @@ STRAY = 4
 
 @dataclass(slots=True)
 class StationRecord:
-    """One station. `missing`: no octet followed. `silent`: those since its last sign of life; `away`: the most of them
-    in a row after which it was heard again. `unheard`: of those that are missing such after which the master went on
-    as after an answer."""
+    """One station. `missing`: no octet followed. `silent`: those since its last sign of life; `away`: those that stood
+    AWAY_LEAST or more in a row after which it was heard again, `times_away` such rows of `away_for` ns. `unheard`: of
+    those that are missing such after which the master went on as after an answer."""
 
     asked: int = 0
     answered: int = 0
     missing: Tally = field(default_factory=Tally)
     silent: Tally = field(default_factory=Tally)
     away: Tally = field(default_factory=Tally)
+    times_away: int = 0
+    away_for: int = 0
     unheard: Tally = field(default_factory=Tally)
     damaged: Tally = field(default_factory=Tally)
     cut: int = 0  # of the damaged answers: ended early
@@ -298,7 +303,10 @@ class StationRecord:
         """Something came in place of its answer."""
         self.last_heard = time
         if self.silent.count:
-            self.away = max(self.away, self.silent, key=lambda one: one.count)
+            if self.silent.count >= AWAY_LEAST:
+                self.away = together((self.away, self.silent))
+                self.times_away += 1
+                self.away_for += self.silent.last - self.silent.first
             self.silent = Tally()
 
 
