@@ -134,7 +134,7 @@ def _digits(line: str, base: int) -> Run | None:
 
 def _numbers(line: str, match: re.Match[str], tokens: list[str], base: int) -> Run | None:
     begin, end = match.span()
-    if _YEAR_AHEAD.search(line[max(0, begin - 5) : begin]) is not None:
+    if _YEAR_AHEAD.search(line[max(0, begin - 5) : begin]) is not None or _SHORT_DATE.fullmatch(match[0]):
         return None
     if base == PAIRS_ONLY and len(tokens) > SURELY and len(tokens[0]) != 2:
         begin += len(tokens[0]) + len(match["between"])  # the number of the line, or of octets
@@ -175,6 +175,8 @@ def _is_date(tokens: list[str]) -> bool:
 
 _DECIMAL = re.compile(r"0|[1-9]\d{0,2}")
 _YEAR_AHEAD = re.compile(r"(?:19|20)\d\d[-./]$")
+_SHORT_DATE = re.compile(r"(?:0?[1-9]|[12]\d|3[01])/(?:0?[1-9]|[12]\d|3[01])/\d\d")
+"""08/17/26: three octets are no message, and nobody writes some so."""
 _LONG_NUMBER = re.compile(r"[ \t]?\d{4,}")
 
 

@@ -34,3 +34,8 @@ def test_they_stand_directly_before_it(tmp_path: Path, clock: str) -> None:
 def test_many_lines_without_a_time_wait_for_none(tmp_path: Path) -> None:
     text = "".join(f"TX: {ASKED.hex(' ')}\nRX: {TOLD.hex(' ')}\n" for _ in range(6))
     assert [one.octets for one in chunks(tmp_path / "x.log", text)] == [ASKED, TOLD] * 6
+
+
+def test_a_date_with_two_digits_of_the_year_is_no_message(tmp_path: Path) -> None:
+    text = f"07:08:09 03/21/26 CET\n\nTX: {ASKED.hex(' ')}\nRX: {TOLD.hex(' ')}\n"
+    assert [one.octets for one in chunks(tmp_path / "x.log", text)] == [ASKED, TOLD]
