@@ -173,7 +173,8 @@ _ALL = (
         "Answers without a request before them. A warning from three on and 1 in 100 of all answers, without those "
         "directly behind octets that are no frame: these were the request. Where most answers come so, those that do "
         "not fit (MB010, MB206) stand under it.",
-        "requests that this tap does not hear, a second bus coupled in, or a device that is set to report by itself",
+        "requests that this tap does not hear, a second bus coupled in, a device that is set to report by itself, or a "
+        "maker's own protocol whose requests have the form of answers",
         "whether the tap is at a place where the master is heard well; a setting for automatic reports in the device",
         explains=_OF_ANOTHER_TALKER,
     ),

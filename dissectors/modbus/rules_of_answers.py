@@ -190,7 +190,8 @@ ANSWER_RULES = (
         "Protocol V1.1b3, 6.11, 6.12, 6.17); or requests for nothing, for more than the standard allows, beyond the "
         "last address, or of a coil's value that is neither on nor off, answered by exception 2 or 3 or by nothing. "
         "What comes of them is not held against the station.",
-        "the master builds the request wrongly; a station can only refuse it",
+        "the master builds the request wrongly, and a station can only refuse it; or both speak a maker's own protocol "
+        "in frames of Modbus",
         "the address, data type and length of this request in the master's configuration or program",
     ),
     Rule(
