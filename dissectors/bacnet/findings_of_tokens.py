@@ -30,10 +30,14 @@ def tokens(ring: Ring) -> Iterable[Remark]:
             and ring.of(RingEventKind.REJOINED, mac).last <= happened.last
         ):
             node = ring.nodes.get(mac)
-            gone = node is not None and max(node.last, node.last_token) <= happened.last
-            if gone and not _comes_back(ring, mac, happened.last):
+            gone = node is not None and node.last_token <= happened.last
+            if node is None or not gone or _comes_back(ring, mac, happened.last):
+                continue
+            if node.last <= happened.last:
                 seen = "did not use its token, was passed over, and has been silent since"
                 yield of("MS106", mac, seen, happened)
+            elif node.replies and not _passes_on(ring, mac, happened.last):
+                yield _answers_alone(of("MS106", mac, "", happened, Severity.WARNING), ring)
     strays = [(mac, happened) for (what, mac), happened in ring.happened.items() if what is RingEventKind.TWO_TOKENS]
     strays += hasty(ring).items()
     together = Happened()
@@ -46,6 +50,29 @@ def tokens(ring: Ring) -> Iterable[Remark]:
     for mac, node in ring.nodes.items():
         if node.polls_sent > ALONE_POLLS and not node.tokens_sent and not node.tokens_received:
             yield _alone(ring, mac, node.polls_sent)
+
+
+def _passes_on(ring: Ring, mac: int, since: int) -> bool:
+    """Whether a station passed a token on after that time."""
+    return any(edge.last > since for (by, _), edge in ring.edges.items() if by == mac)
+
+
+def _answers_alone(left: Remark, ring: Ring) -> Remark:
+    """A station out of the ring that is not off: it is heard, answers when it is asked, and passes no token on."""
+    node = ring.nodes[left.mac] if left.mac is not None else None
+    polled = node is not None and node.last_polled > left.finding.last
+    seen = "did not use its token and was passed over; it is heard since, and passes no token on"
+    seen += ", though it is polled" if polled else ""
+    return Remark(
+        left.mac,
+        replace(
+            left.finding,
+            seen=seen,
+            means="it is on and hears the bus, but takes no part in the ring: what it has to say by itself is not sent",
+            next="whether it was made a slave, or its program hangs; its firmware and its Max_Master"
+            + ("" if polled else "; whether the station before it polls for it at all"),
+        ),
+    )
 
 
 def _alone(ring: Ring, mac: int, polls: int) -> Remark:

@@ -72,7 +72,7 @@ _ALL = (
         Severity.ERROR,
         "station left the ring",
         "A station did not use its token, was passed over, and has not come back; of one that was away before and came "
-        "back, not for twice as long as then.",
+        "back, not for twice as long as then. A warning where it is heard all the same.",
         "it is off, disconnected or has crashed",
         "the station's supply and wiring",
         explains=("MS102", "MS301"),
