@@ -177,7 +177,7 @@ class FieldTree(LineView, inherit_bindings=False):
 
     def render_line(self, y: int) -> Strip:
         """Arrow, name, value."""
-        width, base = self.scrollable_content_region.width, self.rich_style
+        width, base = self.scrollable_content_region.width, self.style_below
         number = self.scroll_offset.y + y
         if number >= len(self._lines):
             return Strip.blank(width, base)

@@ -149,7 +149,7 @@ class HexPane(LineView, inherit_bindings=False):
     def render_line(self, y: int) -> Strip:
         """The title, a line of the dump, or a line error in words."""
         width = self.scrollable_content_region.width
-        base = self.rich_style
+        base = self.style_below
         if y == 0:
             style = base + self._style("title")
             return Strip([Segment(self.title(), style)]).adjust_cell_length(width, style)

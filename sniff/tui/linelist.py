@@ -16,7 +16,6 @@ from textual import events
 from textual.binding import Binding, BindingType
 from textual.geometry import Size
 from textual.message import Message
-from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
 from sniff.config import COLOURS
@@ -24,13 +23,14 @@ from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import Cell, Column, pieces
 from sniff.tui.index import Index
 from sniff.tui.key_names import named
+from sniff.tui.line_view import LineView
 from sniff.tui.view_state import Viewing
 
 SHIFT = 16
 """Cells by which the text scrolls at once."""
 
 
-class LineList(ScrollView, can_focus=True, inherit_bindings=False):
+class LineList(LineView, inherit_bindings=False):
     """Shows the numbers of an index, one a line, below a line of column titles that stays."""
 
     BINDINGS: ClassVar[list[BindingType]] = named(
@@ -332,7 +332,7 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
         return {column.name: Cell(column.title) for column in self.columns}
 
     def _strip(self, cells: list[Cell], width: int, over: str) -> Strip:
-        base = self.rich_style
+        base = self.style_below
         top = self._style(over) if over else None
         segments = []
         for cell in cells:
