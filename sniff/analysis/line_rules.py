@@ -281,8 +281,9 @@ _ALL = (
         Severity.WARNING,
         "silent for a while",
         "Not one octet for 3 s or more (10 s behind a request) and 30 times as long as all but 2 in 100 pauses, in the "
-        "middle of traffic that goes on as before; not where such pauses are regular, and not where octets were lost "
-        "or the adapter was away. Of a bus that is listened to it is told also while it lasts: from a minute on, where "
+        "middle of traffic that goes on as before; not where such pauses are regular, or more than eight and over two "
+        "an hour or 10% of the time, and not where octets were lost or the adapter was away. Of a bus that is listened "
+        "to it is told also while it lasts: from a minute on, where "
         "that is twice as long as any silence before.",
         "the master stopped: a restart, a busy controller, a changeover, a program that was loaded",
         "the master's log and watchdog at that time",

@@ -28,6 +28,11 @@ _NEXT = "whether the master runs and has its supply; the wiring from the bus to 
 
 SILENT_TIMES = 30
 SILENT_KEPT = 8
+SILENT_EVERY = 1800 * NS_PER_S
+SILENT_SHARE = 0.1
+"""So many silences may stand out of any bus; more where they are two an hour at most and a small part of the time."""
+
+SILENT_SHOWN = 5
 ROWS_AROUND = 50
 
 
@@ -94,9 +99,15 @@ class Silences:
         limit = max(SILENT_LEAST, SILENT_TIMES * usual)
         long = [one for one in self._silences if one[1] - one[0] >= limit]
         whole = [one for one in long if one[2] >= ROWS_AROUND and self._rows - one[2] >= ROWS_AROUND // 2]
-        if not whole or len(long) > SILENT_KEPT or _is_regular([end - begin for begin, end, _ in long]):
+        if not whole or self._is_its_way(long) or _is_regular([end - begin for begin, end, _ in long]):
             return []
         return whole
+
+    def _is_its_way(self, long: list[tuple[int, int, int]]) -> bool:
+        """Whether the bus is silent so often, or so long, that it is no interruption: over a night eight come soon."""
+        span, silent = self.now - (self.first or 0), sum(end - begin for begin, end, _ in long)
+        is_often = len(long) * SILENT_EVERY > span or silent > SILENT_SHARE * span
+        return len(long) > SILENT_KEPT and is_often
 
     def lasting(self, now: int) -> Finding | None:
         """That nothing came any more up to `now` (ns), for longer than ever before, on a bus that is listened to."""
@@ -121,9 +132,10 @@ class Silences:
         for begin, _, row in whole:
             tally.add(begin, row, row + 1)
         longest = max(end - begin for begin, end, _ in whole)
-        at = ", ".join(f"{(begin - (self.first or 0)) / NS_PER_S:.1f} s" for begin, _, _ in whole)
+        at = ", ".join(f"{(begin - (self.first or 0)) / NS_PER_S:.1f} s" for begin, _, _ in whole[:SILENT_SHOWN])
+        at += f" … ({len(whole)} times in all)" if len(whole) > SILENT_SHOWN else ""
         seen = (
-            f"not one octet for {longest / NS_PER_S:.1f} s, {longest // max(usual, MS)} times as long as pauses are "
+            f"not one octet for {'up to ' * (len(whole) > 1)}{longest / NS_PER_S:.1f} s, {longest // max(usual, MS)} times as long as pauses are "
             f"here; from {at} on, and everything went on as before"
         )
         yield tally.found(RULES["LN304"], "bus", seen)

@@ -58,3 +58,21 @@ def test_of_a_bus_that_hardly_spoke_silence_says_nothing() -> None:
     for number in range(40):
         _row(silences, number * EVERY, by_columns=False)
     assert silences.lasting(silences.now + 3600 * NS_PER_S) is None
+
+
+@pytest.mark.parametrize(("apart", "is_told"), [(3600, True), (600, False)])
+def test_a_night_has_more_silences_than_an_hour(apart: int, is_told: bool) -> None:
+    """Twelve, no two alike: the master stopped each time, or it is the way of the bus."""
+    silences, now = Silences(), 0
+    for number in range(13):
+        starts = now + np.arange(0, apart * NS_PER_S, NS_PER_S)
+        if not number:
+            _row(silences, 0, by_columns=False)
+            starts = starts[1:]
+        silences.take(starts, starts + MS, np.zeros(len(starts), bool))
+        now = silences.now + (10 + 17 * (number * 7 % 12)) * NS_PER_S
+        silences.take(np.array([now]), np.array([now + MS]), np.array([False]))
+        now += NS_PER_S
+    assert bool(silences.whole()) is is_told
+    if is_told:
+        assert all(" … (" in one.seen for one in silences.findings())
