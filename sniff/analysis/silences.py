@@ -134,9 +134,10 @@ class Silences:
         longest = max(end - begin for begin, end, _ in whole)
         at = ", ".join(f"{(begin - (self.first or 0)) / NS_PER_S:.1f} s" for begin, _, _ in whole[:SILENT_SHOWN])
         at += f" … ({len(whole)} times in all)" if len(whole) > SILENT_SHOWN else ""
+        most, often = "up to " if len(whole) > 1 else "", longest // max(usual, MS)
         seen = (
-            f"not one octet for {'up to ' * (len(whole) > 1)}{longest / NS_PER_S:.1f} s, {longest // max(usual, MS)} times as long as pauses are "
-            f"here; from {at} on, and everything went on as before"
+            f"not one octet for {most}{longest / NS_PER_S:.1f} s, {often} times as long as pauses are here; from {at} "
+            "on, and everything went on as before"
         )
         yield tally.found(RULES["LN304"], "bus", seen)
 

@@ -27,6 +27,11 @@ if TYPE_CHECKING:
     from sniff.analysis.summary import Summary
 
 EVIDENCE_SHOWN = 5
+LONG = 600
+"""Seconds of a capture from which on it is told when a finding was seen: seconds since its begin are no time of day."""
+
+_NEARLY_ALL = 0.9
+_A_YEAR = 366 * 86_400 * NS_PER_S
 _INDENT = " " * 9
 _COLOURS = {Severity.ERROR: "31;1", Severity.WARNING: "33", Severity.NOTE: "36", Severity.INFO: "2"}
 
@@ -176,8 +181,23 @@ def _write_finding(one: Checked, finding: Finding, width: int, colour: bool) -> 
     for word, text in (("means", finding.means), ("next", finding.next)):
         if text and finding.severity > Severity.INFO:
             _paragraph(f"{word + ':':<7}{text}", width, _INDENT, _INDENT + " " * 7)
+    if seen := when(one, finding):
+        _paragraph(f"when:  {seen}", width, _INDENT, _INDENT + " " * 7)
     if finding.evidence:
         _paragraph(evidence(one, finding), width, _INDENT, _INDENT + " " * 7)
+
+
+def when(one: Checked, finding: Finding) -> str:
+    """From when to when it was seen, "2026-03-29 02:10:00 … 02:24:58 UTC"; empty where a capture is short or has no
+    dates, and of what stood nearly all the time."""
+    span = finding.last - finding.first
+    is_dated = one.session.has_times and finding.first >= _A_YEAR and finding.severity > Severity.INFO
+    if one.seconds < LONG or not is_dated or span >= _NEARLY_ALL * one.seconds * NS_PER_S:
+        return ""
+    first, last = (iso(time)[:19].replace("T", " ") for time in (finding.first, finding.last))
+    if first == last:
+        return f"{first} UTC"
+    return f"{first} … {last[11:] if first[:10] == last[:10] else last} UTC"
 
 
 def _write_consequence(one: Checked, finding: Finding, width: int) -> None:
