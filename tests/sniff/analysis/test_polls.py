@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 import pytest
@@ -203,11 +203,17 @@ def _by_rows(session: Session, rows: tuple[Output | LineEvent, ...]) -> Polls:
     return polls
 
 
+@lru_cache(1)  # of a name, all examples are of the same
+def _of_whole(name: str) -> Polls:
+    session, rows, _ = _capture(name)
+    return _by_rows(session, rows)
+
+
 @pytest.mark.parametrize("name", NAMES)
 @settings(max_examples=5, deadline=None)
 @given(st.data())
 def test_tables_say_the_same_wherever_they_are_cut(name: str, data: st.DataObject) -> None:
-    session, rows, whole = _capture(name)
+    session, _, whole = _capture(name)
     polls = Polls(dissector_for(session))
     for table in whole:
         if isinstance(table, LineEvent):
@@ -216,7 +222,7 @@ def test_tables_say_the_same_wherever_they_are_cut(name: str, data: st.DataObjec
         cuts = sorted(data.draw(st.lists(st.integers(0, len(table)), max_size=4)))
         for begin, end in zip([0, *cuts], [*cuts, len(table)], strict=True):
             polls.add_table(table.part(begin, end))
-    expected = _by_rows(session, rows)
+    expected = _of_whole(name)
     assert polls.polls == expected.polls
     assert [poll.key for poll in polls] == [poll.key for poll in expected]
     assert len(expected) > 0
@@ -231,7 +237,7 @@ def test_parts_merge_wherever_a_capture_is_cut(name: str, data: st.DataObject) -
     merged = Polls(dissector_for(session))
     for begin, end in zip([0, *cuts], [*cuts, len(rows)], strict=True):
         merged = merged.merge(_by_rows(session, rows[begin:end]))
-    assert merged.polls == _by_rows(session, rows).polls
+    assert merged.polls == _of_whole(name).polls
 
 
 @given(st.lists(st.integers(-(1 << 40), 1 << 62), max_size=40), st.integers(0, 40))
