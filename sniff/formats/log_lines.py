@@ -132,6 +132,8 @@ def _taken_apart(text: str, base: int, rows: bool, times: Times, least: int) -> 
         run = Run(0, 1, bytes((int(told, 16),)), "one octet")
     if told is not None and run is None and shape.base is not None and (one := number_in(told.strip("[] "))):
         run = Run(0, 1, bytes((int(one, shape.base) & 0xFF,)), "one octet")
+    if run is None and told is None and not _looks(text):
+        return Line(Kind.TEXT, stamp, way_of(text))  # what the tool says beside octets
     if run is None:
         return Line(Kind.STRANGE, stamp, tool=shape.tool)
     begin, end = groups.get("begin"), groups.get("end")

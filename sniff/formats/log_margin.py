@@ -34,6 +34,12 @@ _NAMES = re.compile(
     r"(?=.*(?:[0-9A-Fa-f]{2}[\s,;:-]?){3})"
 )
 """Addresses of hosts and network cards, and identities, before octets of the same line."""
+_CARDS = re.compile(
+    r"\b(?:mac|bssid|hwaddr|ether|bd[_ ]?addr)(?:[ _]?addr(?:ess)?)?(?:[^0-9A-Za-z]{1,4}| is )"
+    r"[0-9A-F]{2}(?P<sign>[:-])(?:[0-9A-F]{2}(?P=sign)){4}[0-9A-F]{2}(?![0-9A-Z:-])",
+    re.IGNORECASE,
+)
+"""Addresses of network cards, by what stands before them."""
 _RUN = re.compile(
     r"(?<![0-9A-Za-z_#.,:])(?P<ahead>\d{1,4})?(?(ahead)(?:[ \t]+|[;,|]))"
     r"(?P<run>[0-9A-Fa-f]{2}(?:(?P<sign>[ ;,\t|])[0-9A-Fa-f]{2})(?:(?P=sign)[0-9A-Fa-f]{2})+)"
@@ -79,6 +85,7 @@ class Margin:
     def without(self, text: str) -> str:
         """A line without it."""
         text = _NAMES.sub(_blank, self.writing.rewritten(plain_signs(text)))
+        text = _CARDS.sub(_blank, text) if ":" in text or "-" in text else text
         if self.quotes:
             text = _QUOTE.sub("", text, count=1) if _QUOTE.match(text) else text
         if self.numbers and (match := _NUMBER.match(text)) is not None:

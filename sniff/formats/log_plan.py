@@ -233,11 +233,13 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
         amounts[line.family] += len(line.octets)
         if line.way or line.tool:
             directed.add(line.family)
+    checked = _checked(with_octets)
+    directed |= checked
     main = max(amounts, key=lambda name: amounts[name])
     best = max((name for name in amounts if name in directed), key=lambda name: amounts[name], default=None)
     if best is not None and 4 * amounts[best] >= amounts[main]:
         main = best
-    roles = _roles(with_octets, main, directed) | dict.fromkeys(echoing(with_octets, main), Role.SAME)
+    roles = _roles(with_octets, main, directed, checked) | dict.fromkeys(echoing(with_octets, main), Role.SAME)
     data = [line for line in with_octets if line.tool or line.bare or roles.get(line.family) is Role.DATA]
     told = sum(len(line.octets) for line in data)
     if not data or (told < 3 and not known and written > len(data)):
@@ -279,7 +281,16 @@ def _are_headed(lines: Sequence[Line]) -> bool:
     return (blocks >= _FIXED_LEAST and headed >= _MOSTLY * blocks) or 0 < blocks == known
 
 
-def _roles(lines: Sequence[Line], main: str, directed: set[str]) -> dict[str, Role | None]:
+def _checked(lines: Sequence[Line]) -> set[str]:
+    """Labels of which most lines are messages that end with their check: they say octets, whatever their words are."""
+    many, good = Counter[str](), Counter[str]()
+    for line in lines:
+        many[line.family] += 1
+        good[line.family] += len(line.octets) > SURELY and ends_with_crc16(line.octets)
+    return {family for family in good if family and 2 * good[family] > many[family]}
+
+
+def _roles(lines: Sequence[Line], main: str, directed: set[str], checked: set[str]) -> dict[str, Role | None]:
     """What lines with each label mean."""
     text = b"".join(line.octets for line in lines if line.family == main)
     many_of = Counter(line.family for line in lines)
@@ -315,7 +326,7 @@ def _roles(lines: Sequence[Line], main: str, directed: set[str]) -> dict[str, Ro
             and stretches[family] >= min(many, _FIXED_LEAST)  # between the others: a master asks the same for ever
         ):
             roles[family] = Role.SAME
-        elif _by_another_sign(main, family, lines):
+        elif _by_another_sign(main, family, lines, main in checked):
             roles[family] = None
         elif (
             family in directed
@@ -328,9 +339,12 @@ def _roles(lines: Sequence[Line], main: str, directed: set[str]) -> dict[str, Ro
     return roles
 
 
-def _by_another_sign(main: str, family: str, lines: Sequence[Line]) -> bool:
-    """Whether lines have numbers that may be octets where a known tool writes its octets so that they are sure."""
-    is_sure = all(line.tool and not line.spelling.startswith(_NUMBERS) for line in lines if line.family == main)
+def _by_another_sign(main: str, family: str, lines: Sequence[Line], checked: bool) -> bool:
+    """Whether lines have numbers that may be octets where a known tool, or messages with their check, are written so
+    that they are sure."""
+    is_sure = all(
+        (line.tool or checked) and not line.spelling.startswith(_NUMBERS) for line in lines if line.family == main
+    )
     return is_sure and all(line.spelling.startswith(_NUMBERS) for line in lines if line.family == family)
 
 

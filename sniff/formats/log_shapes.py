@@ -133,7 +133,7 @@ SHAPES: tuple[Shape, ...] = (
     _shape("mbpoll", r"^\[\d+\]:\s+-?[\d.]+(?:\s\(.*\))?$", Role.NOTHING),
     _shape("libmodbus", r"^(?:Waiting for|ERROR |Request for slave|Opening |Bytes flushed|Connecting|The responding)",
            Role.NOTHING),
-    _shape("libmodbus", r"^(?:[\[<][0-9A-F]{2}[\]>]){3,}"),
+    _shape("libmodbus", r"^\s*(?:[\[<][0-9A-F]{2}[\]>]){3,}"),
     _shape("pymodbus", r"\bFrame - (?:\[.*\] )?not ready\b", Role.AGAIN),
     _shape("pymodbus", r"\b(?P<way>send|recv|SEND|RECV):\s+0x"),
     _shape("modbus_tk", r"(?P<way>->|<-)\s*\d{1,3}-\d{1,3}-\d{1,3}"),

@@ -32,6 +32,8 @@ from sniff.formats import read
 
 CAPTURES = Path(__file__).parents[3] / "captures"
 NAMES = sorted(path.name for path in CAPTURES.glob("*.cap.txt"))
+WITHOUT_POLLS = {"profibus-looks-for-its-slave.cap.txt", "rtu-frames-of-a-network.cap.txt"}
+"""No station of these is asked again and again."""
 LINE = LineSettings.parse("19200,8E1")
 BEGIN, MS, SECOND = 1_772_359_200_000_000_000, 1_000_000, 1_000_000_000
 
@@ -225,7 +227,7 @@ def test_tables_say_the_same_wherever_they_are_cut(name: str, data: st.DataObjec
     expected = _of_whole(name)
     assert polls.polls == expected.polls
     assert [poll.key for poll in polls] == [poll.key for poll in expected]
-    assert len(expected) > 0
+    assert (len(expected) > 0) is (name not in WITHOUT_POLLS)
 
 
 @pytest.mark.parametrize("name", NAMES)

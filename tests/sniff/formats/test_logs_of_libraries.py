@@ -135,6 +135,10 @@ def arguments() -> str:
     return log
 
 
+def arguments_of_a_service() -> str:
+    return "".join(f"Nov 28 10:00:{at:02d} pi app[311]: {line}\n" for at, line in enumerate(arguments().splitlines()))
+
+
 LOGS: dict[Callable[[], str], tuple[str, ...]] = {
     forum: (A, R),
     jsmodbus: (A, R),
@@ -146,6 +150,7 @@ LOGS: dict[Callable[[], str], tuple[str, ...]] = {
     names_with_values: (A, R, A2, R2, A2, CUT, "FF"),
     doubled: (A, R, A2, R2),
     arguments: (A, R, A2, R2),
+    arguments_of_a_service: (A, R, A2, R2),
 }
 
 
@@ -245,6 +250,8 @@ def test_a_message_in_other_digits_than_most(tmp_path: Path) -> None:
         "2024-11-28 10:00:0{0},2{0}.5,4{0}",
         "I (9{0}) boot: load:0x3fff0030,len:717{0}",
         "usb 1-1: New USB device found, idVendor=0403, idProduct=600{0}",
+        "[19:17:2{0}][C][wifi:408]:   Local MAC: DC:DA:0C:C5:6E:9{0}",
+        "eth{0}: MAC address is dc-da-0c-c5-6e-9{0}",
     ],
 )
 def test_values_and_lengths_are_no_octets(line: str, tmp_path: Path) -> None:
