@@ -104,6 +104,7 @@ class LineFindings:
         self._called_last: str | None = None  # whom the newest frame was sent to
         self._awaited = 0  # strays away from frames, while an answer is due
         self._instead: Counter[str] = Counter()  # strays that came in place of an answer, by who was asked
+        self._ahead: Counter[str] = Counter()  # strays apart from frames before an answer, by who gave it
         self._pending: list[_Stray] = []  # noise beside frames, of which the frame to come tells
         self._begins = UnsureStrays()  # noise that may be the begin of the frame to come
         self._pieces = TornPieces(dissector or dissector_for(session), session.timing, STRAY_MOST)
@@ -224,6 +225,8 @@ class LineFindings:
                 self._count_instead(code == "LN203", stray.asked)
             if self._asker is not None and sender in (self._asker, BUS):  # as in `_Stray.told`
                 self._count_instead(self._awaited, self._called_last)
+            elif self._asker is not None and self._awaited and sender in self._senders.by_name:
+                self._ahead[sender] += 1
             self._begins.forget()
             self._pending.clear()
         else:
@@ -401,7 +404,7 @@ class LineFindings:
     def _of_bus(self) -> Iterator[Finding]:
         yield from self._senders.breaks_found(self._note_if)
         rests = self._remains.found(self._octets, self._senders.by_name.keys() - {BUS, MASTER})
-        for stray in strays_found(self._senders, self._instead, self._note_if):
+        for stray in strays_found(self._senders, self._instead, self._ahead, self._note_if):
             many = stray.code == "LN203" and stray.subject == BUS and self._remains.octets > OUTWEIGHED * stray.count
             is_part = rests is not None and rests.severity >= Severity.WARNING and many
             yield as_consequence(stray, rests, RULES) if rests is not None and is_part else stray

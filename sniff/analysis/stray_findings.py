@@ -13,13 +13,16 @@ from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.sender_findings import BUS, MASTER, NoteIf, Sender, Senders
 from sniff.analysis.shares import only_struck, standing_out
 
+AHEAD_LEAST, AHEAD = 5, 0.9
+"""So many of them, and of all of them, between a request and its answer."""
+
 INSTEAD_LEAST, INSTEAD = 3, 0.7
 """So many stray octets, and of all of them, in place of one station's answers: they are its own."""
 
 
-def strays_found(senders: Senders, instead: Counter[str], note_if: NoteIf) -> Iterator[Finding]:
+def strays_found(senders: Senders, instead: Counter[str], ahead: Counter[str], note_if: NoteIf) -> Iterator[Finding]:
     """Stray octets: of a sender that has more than its share of them, else of the bus, told once. `instead`: how many
-    came in place of an answer, by the station that was asked."""
+    came in place of an answer, by the station that was asked; `ahead`: before how many answers some stood apart."""
     by_name = _settled(senders.by_name)
     own: list[tuple[str, str]] = []
     common: dict[str, list[str]] = {"LN201": [], "LN202": []}
@@ -60,7 +63,7 @@ def strays_found(senders: Senders, instead: Counter[str], note_if: NoteIf) -> It
         yield found
     if total:
         found, values = _of_all(senders, by_name, among, silence, common, note_if)
-        found = _of_one_asked(found, instead, senders)
+        found = _before_answers(_of_one_asked(found, instead, senders), ahead, senders)
         theirs = [one for one, own_values in told if values.keys() <= own_values and total <= one.count]
         if theirs:  # the same octets, seen apart from the frame
             yield as_consequence(found, theirs[0], RULES)
@@ -122,6 +125,23 @@ def _of_one_asked(finding: Finding, instead: Counter[str], senders: Senders) -> 
         means="something is connected at this address and moves the line: a driver without data, the end of an answer",
         next="its supply, its driver's direction control, its connection",
     )
+
+
+def _before_answers(finding: Finding, ahead: Counter[str], senders: Senders) -> Finding:
+    """What is found of silence, where nearly all stand between a request and its answer: of one station, where others
+    have hardly any."""
+    ((name, count),) = ahead.most_common(1) or (("", 0),)
+    if finding.code != "LN203" or finding.subject != BUS or ahead.total() < max(AHEAD_LEAST, AHEAD * finding.count):
+        return finding
+    words = f"{finding.seen}; {ahead.total()} of them between a request and its answer"
+    means = f"a driver that moves the line before it sends, or lets go with a jerk; or {finding.means}"
+    told = replace(finding, seen=words, means=means)
+    others = sum(one.frames for other, one in senders.by_name.items() if other not in (BUS, MASTER, name))
+    alone = count >= AHEAD * ahead.total() and 2 * count > senders.by_name[name].frames
+    if not alone or others < AHEAD_LEAST:
+        return told
+    settle = "its driver's direction control and turnaround; bias"
+    return replace(told, subject=name, seen=f"{words}", next=settle)
 
 
 def _of_all(

@@ -23,5 +23,5 @@ def test_who_sends_most_is_struck_alone_now_and_then(name: str, count: int, whos
     stray = senders.of(name).stray["LN202"] = Tally()
     for no in range(count):
         stray.add(no, no)
-    (finding,) = strays_found(senders, Counter(), lambda count, of: None)
+    (finding,) = strays_found(senders, Counter(), Counter(), lambda count, of: None)
     assert (finding.code, finding.subject) == ("LN202", whose or name)
