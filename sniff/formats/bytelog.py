@@ -210,10 +210,14 @@ class ByteLog:
         assert self._plan is not None
         counts = self._counts
         assembly = Assembly(self._plan, self.session.line)
-        for number, text in enumerate(self._plan.margin.joined(self._lines()), 1):
-            line = self._plan.line(text)
-            yield from assembly.take(line, text)
-            counts.add(assembly.was, line.kind, number)
+        try:
+            for number, text in enumerate(self._plan.margin.joined(self._lines()), 1):
+                line = self._plan.line(text)
+                yield from assembly.take(line, text)
+                counts.add(assembly.was, line.kind, number)
+        except CaptureError:  # a file that ends in damage gives what is before it
+            yield from assembly.close()
+            raise
         yield from assembly.close()
         counts.completed, counts.unwrapped = assembly.completed, assembly.unwrapped
 

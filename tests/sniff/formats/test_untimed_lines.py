@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from dissectors.frame import Chunk
 from dissectors.line import MS
+from sniff.engine.capture import CaptureError
 from sniff.formats import read
 from sniff.formats.log_untimed import unknown_by
 
@@ -43,3 +46,22 @@ def test_one_time_in_a_log_is_not_that_of_all(tmp_path: Path) -> None:
     block = f"[N] Raw buffer received: @3FFB33BC/8:\n  | 0000: {ASKED}   |...k...F        |\n"
     path.write_text("[E] 8018|server.cpp  [ 265] serve: RTU receive: E5 - Packet length error\n" + block * 4)
     assert not read(path).session.has_times
+
+
+def test_what_waits_for_a_time_is_given_where_the_file_ends_in_damage(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "x.log"
+    path.write_text(f"2024-05-01 10:00:00.000 Sending: {ASKED}\nAnswer: {ANSWERED}\n" * 3)
+    capture = read(path)
+    lines = path.read_text().splitlines()
+
+    def damaged() -> Iterator[str]:
+        yield from lines
+        raise CaptureError("damaged")
+
+    monkeypatch.setattr(capture, "_lines", damaged)
+    given: list[bytes] = []
+    with pytest.raises(CaptureError):
+        given.extend(item.octets for item in capture.items() if isinstance(item, Chunk))
+    assert given == [bytes.fromhex(ASKED), bytes.fromhex(ANSWERED)] * 3
