@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from math import erfc, exp, lgamma, log, log1p, sqrt
 
+from dissectors.busiest import Quarters, is_fault
+
 _EXACT_MOST = 400
 _NEGLIGIBLE = 1e-12
 
@@ -46,10 +48,13 @@ def is_by_chance(count: int, of: int, share: float, senders: int) -> bool:
     return senders * at_least(count, of, share) >= (SELDOM_ALONE if count == of else SELDOM)
 
 
-def is_rare(count: int, of: int, span: int) -> bool:
+def is_rare(count: int, of: int, span: int, quarters: Quarters | None = None) -> bool:
     """Whether so few in `span` ns are not worth a warning: one; or under 1 in 100 and not surely over two a minute.
 
-    Of few counted ones chance makes more: up to four in one minute, eight in two, 28 in ten.
+    Of few counted ones chance makes more: up to four in one minute, eight in two, 28 in ten. `quarters`: when they
+    came; what is rare over a night was none where it was a fault for a quarter of an hour.
     """
+    if quarters is not None and is_fault(quarters, of, span):
+        return False
     usual = TOLERABLE * max(1, -(-span // MINUTE))
     return count == 1 or (FEW * count < of and count <= usual + 2 * sqrt(usual))

@@ -9,13 +9,19 @@ A protocol brings its rules as `Dissector.judge`, a function Timing → `Judge`,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from itertools import islice
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
+from dissectors import busiest
 from dissectors.frame import Event, Header
+from dissectors.papers import ExceptionWords as ExceptionWords
+from dissectors.papers import KnowsResponseTimes as KnowsResponseTimes
+from dissectors.papers import KnowsStations as KnowsStations
+from dissectors.papers import KnowsUnexecuted as KnowsUnexecuted
+from dissectors.papers import WordsExceptions as WordsExceptions
 from dissectors.subject import Subject, as_subject
 from dissectors.tracker import Placement, Transaction
 
@@ -151,61 +157,23 @@ class Judge(Protocol):
         ...
 
 
-ExceptionWords = Callable[[int, int], str]
-"""Station and exception code → what the manual of that device says of the code; empty where it is not known."""
-
-
-@runtime_checkable
-class WordsExceptions(Protocol):
-    """A judge that can be told how makers word exception codes: what they mean in the standard may be untrue there."""
-
-    def word_exceptions(self, words: ExceptionWords) -> None:
-        """Use these words from here on, also for what was seen before."""
-        ...
-
-
-@runtime_checkable
-class KnowsStations(Protocol):
-    """A judge that can be told of which stations the device's papers say what numbers it can be given, so that the
-    standard's range is not theirs."""
-
-    def know_stations(self, said: Callable[[int], bool]) -> None:
-        """Use these from here on, also for what was seen before."""
-        ...
-
-
-@runtime_checkable
-class KnowsResponseTimes(Protocol):
-    """A judge that can be told how long each station may take to answer by the papers of its device."""
-
-    def know_response_times(self, most: Callable[[int], int | None]) -> None:
-        """`most(station)`: ns, None where nobody says. Use it from here on."""
-        ...
-
-
-@runtime_checkable
-class KnowsUnexecuted(Protocol):
-    """A judge that can be told what a device acknowledges and does not do, by its papers."""
-
-    def know_unexecuted(self, ignores: Callable[[int, str, str], bool]) -> None:
-        """`ignores(station, kind of exchange, kind of object)`. Use it from here on."""
-        ...
-
-
 @dataclass(slots=True)
 class Tally:
-    """How often, when (ns) and in which frames one thing was seen; the first EVIDENCE_MAX frames are kept."""
+    """How often, when (ns) and in which frames one thing was seen; the first EVIDENCE_MAX frames are kept. `quarters`:
+    how many in each quarter of an hour."""
 
     count: int = 0
     first: int = 0
     last: int = 0
     evidence: list[int] = field(default_factory=list)
+    quarters: busiest.Quarters = field(default_factory=dict)
 
     def add(self, time: int, *frames: int | None) -> None:
         """Count one more at `time`."""
         self.first = min(self.first, time) if self.count else time
         self.last = max(self.last, time) if self.count else time
         self.count += 1
+        busiest.count(self.quarters, time)
         if len(self.evidence) < EVIDENCE_MAX:
             self.evidence.extend(no for no in frames if no is not None and no not in self.evidence)
 
@@ -216,6 +184,8 @@ class Tally:
         self.first = min(self.first, *times) if self.count else min(times)
         self.last = max(self.last, *times) if self.count else max(times)
         self.count += len(times)
+        for time in times:
+            busiest.count(self.quarters, time)
         for no in islice(frames, max(0, EVIDENCE_MAX - len(self.evidence))):
             self.evidence.append(no)
 
@@ -240,7 +210,8 @@ def together(tallies: Iterable[Tally]) -> Tally:
         return Tally()
     frames = sorted({no for one in seen for no in one.evidence})
     first, last = min(one.first for one in seen), max(one.last for one in seen)
-    return Tally(sum(one.count for one in seen), first, last, frames[:EVIDENCE_MAX])
+    quarters = busiest.summed(one.quarters for one in seen)
+    return Tally(sum(one.count for one in seen), first, last, frames[:EVIDENCE_MAX], quarters)
 
 
 def with_consequences(findings: Iterable[Finding], rules: Mapping[str, Rule]) -> tuple[Finding, ...]:

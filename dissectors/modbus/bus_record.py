@@ -299,9 +299,9 @@ class BusRecord:
         """The record of one sender's gaps."""
         return by_sender.setdefault(sender, Tally())
 
-    def rare(self, count: int, of: int) -> bool:
-        """Whether so few are not worth a warning."""
-        return is_rare(count, of, self.span)
+    def rare(self, count: int, of: int, when: Tally | None = None) -> bool:
+        """Whether so few are not worth a warning. `when`: they themselves, where it is known when they came."""
+        return is_rare(count, of, self.span, None if when is None else when.quarters)
 
 
 def _usual(station: StationRecord) -> int:

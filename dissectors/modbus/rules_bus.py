@@ -366,7 +366,7 @@ def _common_damage(seen: BusRecord, damage: DamageShare) -> list[Finding]:
         words += f", and {counted(hits['master'], 'request')}"
     among = len(hits) > 1
     words += ": of each about as much as it sends" if among else ": too few, and too close together, to say whose"
-    finding = tally.found(RULES["MB007"], "bus", words, note_if(seen.rare(damaged, asked)))
+    finding = tally.found(RULES["MB007"], "bus", words, note_if(seen.rare(damaged, asked, tally)))
     return [replace(finding if among else of_few(finding), count=answers, stations=() if among else tuple(struck))]
 
 

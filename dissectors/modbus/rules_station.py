@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
+from dissectors import busiest
 from dissectors.findings import EVIDENCE_MAX, Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Flaw
 from dissectors.late_speakers import reaching
@@ -125,7 +126,8 @@ def of_missing(seen: BusRecord, unit: int, station: StationRecord, is_scanned: b
             left -= away.count
     if left > 0:
         words = f"no answer to {left} of {counted(station.asked, 'request')}"
-        finding = missing.found(RULES["MB002"], name, words, note_if(seen.rare(left, station.asked)))
+        words += busiest.words(missing.quarters, left, station.asked, seen.span)
+        finding = missing.found(RULES["MB002"], name, words, note_if(seen.rare(left, station.asked, missing)))
         yield replace(finding, count=left)
 
 
@@ -165,7 +167,7 @@ def _damaged(seen: BusRecord, unit: int, station: StationRecord, is_common: bool
     damaged, ends = station.damaged, station.last_octet
     if not damaged.count or is_absent(station):
         return
-    rare = seen.rare(damaged.count, station.asked)
+    rare = seen.rare(damaged.count, station.asked, damaged)
     is_chance = falls_there_by_chance(seen, name, ends.count, damaged.count)
     if ends.count >= 3 and 2 * ends.count >= damaged.count and not is_chance:
         words = f"{ends.count} of {counted(station.asked, 'answer')} right but for the last octet"
@@ -184,6 +186,7 @@ def _damaged(seen: BusRecord, unit: int, station: StationRecord, is_common: bool
     words += f" ({', '.join(details)})" if details else ""
     if station.asked >= 20:
         words += f"; that is {share_words(damaged.count, station.asked)} of all, with 95% confidence"
+    words += busiest.words(damaged.quarters, damaged.count, station.asked, seen.span)
     finding = damaged.found(RULES["MB005"], name, words, note_if(rare or is_common))
     finding = of_few(finding) if damaged.count < _SYSTEM_LEAST else finding
     if (longer := station.talked_over.count - station.cut) > 1 and 2 * longer >= damaged.count:

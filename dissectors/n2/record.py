@@ -88,7 +88,7 @@ class Damages:
 
 def _with(settled: Tally, recent: Iterable[tuple[int, int | None]]) -> Tally:
     """A tally and what is not settled yet."""
-    both = Tally(settled.count, settled.first, settled.last, list(settled.evidence))
+    both = Tally(settled.count, settled.first, settled.last, list(settled.evidence), dict(settled.quarters))
     for time, frame in recent:
         both.add(time, frame)
     return both

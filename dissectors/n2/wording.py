@@ -85,7 +85,7 @@ class N2Evidence:
 
     def is_rare(self, tally: Tally, of: int) -> bool:
         """Whether so few are not worth a warning."""
-        return is_rare(tally.count, of, self.span)
+        return is_rare(tally.count, of, self.span, tally.quarters)
 
     def noted_if(self, rare: bool, finding: Finding) -> Finding:
         """The finding, only as a note where it is rare."""

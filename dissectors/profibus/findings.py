@@ -6,12 +6,14 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
+from dissectors import busiest
 from dissectors.findings import Finding, Severity, Tally, counted, times
 from dissectors.frame import Event, Frame, Header, Role
 from dissectors.last_silence import fallen_silent
 from dissectors.line import NS_PER_S, Timing
 from dissectors.profibus.blame import ONE_STATION, SentOctets
 from dissectors.profibus.diagnosis_findings import codes_of, diagnosis_grave, diagnosis_seen
+from dissectors.profibus.finding_words import unheard_words, watchdog_words
 from dissectors.profibus.record import RequestsRecord, joined
 from dissectors.profibus.ring import MasterView, Ring, RingWindow
 from dissectors.profibus.rules import RULES, usual_tsdr
@@ -146,15 +148,21 @@ class ProfibusFindings:
         yield from self._of_damage()
         yield from self._of_masters()
 
+    @property
+    def _span(self) -> int:
+        ring = self.watch.ring()
+        return max(0, ring.last - ring.first)
+
     def _of_exchanges(self, who: Subject, record: RequestsRecord) -> Iterator[Finding]:
         silent, total = record.unanswered, record.requests
         if silent.count and not record.answers and silent.count >= _LEAST:
             grave = Severity.ERROR if record.fresh >= _LEAST_FRESH and record.silent > record.unheard else Severity.NOTE
-            seen = f"no answer to any of {counted(total, 'request')}{_unheard_seen(record)}"
+            seen = f"no answer to any of {counted(total, 'request')}{unheard_words(record)}"
             yield silent.found(RULES["PB001"], who, seen, grave)
         elif silent.count and record.answers:
-            grave = _grave(record.silent, total)
-            seen = f"{silent.count} of {total} requests without answer{_unheard_seen(record)}"
+            grave = _grave(record.silent, total, silent, self._span)
+            seen = f"{silent.count} of {total} requests without answer"
+            seen += busiest.words(silent.quarters, silent.count, total, self._span) + unheard_words(record)
             yield fallen_silent(silent.found(RULES["PB002"], who, seen, grave), record.silence, self.watch.ring().last)
         if record.twice.count:
             often = record.twice.count >= _LEAST and record.twice.count >= _SHARE * total
@@ -201,7 +209,7 @@ class ProfibusFindings:
         fallen = self._noted.get((Notice.DROP, address))
         if fallen is not None:
             grave = Severity.ERROR if fallen.count >= _LEAST else Severity.WARNING
-            seen = f"left data exchange {times(fallen.count)}{_watchdog(slave)}"
+            seen = f"left data exchange {times(fallen.count)}{watchdog_words(slave)}"
             if not self._has_times:
                 grave = Severity.NOTE
                 seen += "; whether its master was silent before, a log without times does not tell"
@@ -254,10 +262,12 @@ class ProfibusFindings:
             seen = f"{answers[worst].count} of {asked} answers damaged"
             others_damaged = damaged.count - answers[worst].count
             seen += f", and {counted(others_damaged, 'other telegram')} on the bus" if others_damaged > 0 else ""
-            yield answers[worst].found(RULES["PB008"], station(worst), seen, _grave(answers[worst].count, asked))
+            seen += busiest.words(answers[worst].quarters, answers[worst].count, asked, self._span)
+            grave = _grave(answers[worst].count, asked, answers[worst], self._span)
+            yield answers[worst].found(RULES["PB008"], station(worst), seen, grave)
         else:
             seen = f"{damaged.count} of {checked} telegrams (tokens aside) damaged"
-            yield damaged.found(RULES["PB008"], BUS, seen, _grave(damaged.count, checked))
+            yield damaged.found(RULES["PB008"], BUS, seen, _grave(damaged.count, checked, damaged, self._span))
 
     def _of_masters(self) -> Iterator[Finding]:
         for (what, address), tally in sorted(self._noted.items(), key=lambda one: (one[0][0].value, one[0][1])):
@@ -333,9 +343,12 @@ class ProfibusFindings:
         return f"outputs are cleared for {self.watch.longest_clear(address) / NS_PER_S:.0f} s of data exchange"
 
 
-def _grave(count: int, total: int) -> Severity:
-    """How grave it is that `count` of `total` are wrong: noted below one in a hundred."""
-    return Severity.WARNING if count >= _LEAST and count >= _SHARE * total else Severity.NOTE
+def _grave(count: int, total: int, when: Tally | None = None, span: int = 0) -> Severity:
+    """How grave it is that `count` of `total` are wrong: noted below one in a hundred, and in each quarter of an hour
+    of `span` ns, where it is known when they came."""
+    many = count >= _LEAST and count >= _SHARE * total
+    is_fault = when is not None and busiest.is_fault(when.quarters, total, span)
+    return Severity.WARNING if many or is_fault else Severity.NOTE
 
 
 def _of_polls(tally: Tally, address: int, seen: str, view: MasterView) -> Finding:
@@ -348,14 +361,3 @@ def _of_polls(tally: Tally, address: int, seen: str, view: MasterView) -> Findin
         means="a master that asks so whether its slaves are there, before it gives them parameters",
         next="the supply, address switch and baud rate of the slaves that do not answer",
     )
-
-
-def _unheard_seen(record: RequestsRecord) -> str:
-    if not record.unheard:
-        return ""
-    return f"; after {record.unheard} of them the master counts on: it had an answer that this tap did not hear"
-
-
-def _watchdog(slave: SlaveView) -> str:
-    watchdog = "" if slave.given is None else slave.given.watchdog_words
-    return f"; its watchdog is set to {watchdog}" if watchdog else ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from dissectors.busiest import summed
 from dissectors.findings import EVIDENCE_MAX, Tally
 from dissectors.frame import Flaw, Frame
 from dissectors.last_silence import LastSilence
@@ -141,4 +142,5 @@ def joined(tallies: Sequence[Tally]) -> Tally:
     """Several tallies as one; there must be one."""
     evidence = sorted(no for tally in tallies for no in tally.evidence)[:EVIDENCE_MAX]
     first, last = min(tally.first for tally in tallies), max(tally.last for tally in tallies)
-    return Tally(sum(tally.count for tally in tallies), first, last, evidence)
+    quarters = summed(tally.quarters for tally in tallies)
+    return Tally(sum(tally.count for tally in tallies), first, last, evidence, quarters)
