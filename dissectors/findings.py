@@ -16,12 +16,12 @@ from itertools import islice
 from typing import Protocol
 
 from dissectors import busiest
+from dissectors.device_facts import ExceptionWords as ExceptionWords
+from dissectors.device_facts import KnowsResponseTimes as KnowsResponseTimes
+from dissectors.device_facts import KnowsStations as KnowsStations
+from dissectors.device_facts import KnowsUnexecuted as KnowsUnexecuted
+from dissectors.device_facts import WordsExceptions as WordsExceptions
 from dissectors.frame import Event, Header
-from dissectors.papers import ExceptionWords as ExceptionWords
-from dissectors.papers import KnowsResponseTimes as KnowsResponseTimes
-from dissectors.papers import KnowsStations as KnowsStations
-from dissectors.papers import KnowsUnexecuted as KnowsUnexecuted
-from dissectors.papers import WordsExceptions as WordsExceptions
 from dissectors.subject import Subject, as_subject
 from dissectors.tracker import Placement, Transaction
 

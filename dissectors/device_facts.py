@@ -1,4 +1,4 @@
-"""What a judge can be told of devices that is in their papers, and nowhere on the line."""
+"""What a judge can be told of devices that stands in their manuals, and nowhere on the line."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class WordsExceptions(Protocol):
 
 @runtime_checkable
 class KnowsStations(Protocol):
-    """A judge that can be told of which stations the device's papers say what numbers it can be given, so that the
+    """A judge that can be told of which stations the device's manual says what numbers it can be given, so that the
     standard's range is not theirs."""
 
     def know_stations(self, said: Callable[[int], bool]) -> None:
@@ -30,7 +30,7 @@ class KnowsStations(Protocol):
 
 @runtime_checkable
 class KnowsResponseTimes(Protocol):
-    """A judge that can be told how long each station may take to answer by the papers of its device."""
+    """A judge that can be told how long each station may take to answer by the manual of its device."""
 
     def know_response_times(self, most: Callable[[int], int | None]) -> None:
         """`most(station)`: ns, None where nobody says. Use it from here on."""
