@@ -39,7 +39,7 @@ class KnowsResponseTimes(Protocol):
 
 @runtime_checkable
 class KnowsUnexecuted(Protocol):
-    """A judge that can be told what a device acknowledges and does not do, by its papers."""
+    """A judge that can be told what a device acknowledges and does not do, by its manual."""
 
     def know_unexecuted(self, ignores: Callable[[int, str, str], bool]) -> None:
         """`ignores(station, kind of exchange, kind of object)`. Use it from here on."""

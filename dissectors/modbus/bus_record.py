@@ -91,7 +91,7 @@ class BusRecord:
     `late_frames`: answers that came too late. `broadcast_answers`: who answered broadcasts. `pairs`: (unit asked, unit
     that answered); `repeated_elsewhere`: repeats of requests that such a pair is about, by unit asked.
     `maker_words`: unit and exception code → what the maker of the device says of it, empty where not known;
-    `has_numbers`: unit → whether its papers say which numbers it can be given.
+    `has_numbers`: unit → whether its manual says which numbers it can be given.
     """
 
     timing: Timing

@@ -68,7 +68,7 @@ def meant(frame: Frame, header: Header, role: Role, meaning: Meaning) -> str:
 
 
 def _is_ignored(asked: Command, meaning: Meaning) -> bool:
-    """Whether the device acknowledges the command and does not do it, by its papers."""
+    """Whether the device acknowledges the command and does not do it, by its manual."""
     limits = meaning.profile.limits_on("n2") if meaning.profile is not None else None
     return limits is not None and limits.ignores(asked.type.kind, region_name(asked.region or 0))
 

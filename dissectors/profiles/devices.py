@@ -32,7 +32,7 @@ class Devices:
         return "" if profile is None else profile.exception(family, code)
 
     def says_numbers(self, address: int, family: str) -> bool:
-        """Whether the papers of the device there say which numbers it can be given."""
+        """Whether the manual of the device there says which numbers it can be given."""
         profile = self.at(address)
         return profile is not None and profile.limits_on(family).stations is not None
 
@@ -42,7 +42,7 @@ class Devices:
         return profile is not None and profile.limits_on(family).ignores(kind, space)
 
     def response_at(self, address: int, family: str, baud: int) -> int | None:
-        """ns that a station may take to answer at a rate, by its papers; None where they do not say."""
+        """ns that a station may take to answer at a rate, by its manual; None where it does not say."""
         profile = self.at(address)
         return None if profile is None else profile.limits_on(family).responses.get(baud)
 
