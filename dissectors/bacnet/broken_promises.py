@@ -18,7 +18,7 @@ KEPT = 256
 
 
 class BrokenPromises:
-    """Fed every exchange that ended so (`exchange.NEVER_ANSWERED`)."""
+    """Fed every exchange that ended so (`exchange.Ending.NEVER_ANSWERED`)."""
 
     def __init__(self) -> None:
         self._broken: dict[int, Tally] = {}  # by station

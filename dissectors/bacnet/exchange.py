@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import NamedTuple
 
 from dissectors.bacnet import message as messages
@@ -15,8 +16,10 @@ from dissectors.tracker import Interval, Transaction, Verdict
 _TOKEN, _POLL, _TEST = (bytes((kind,)) for kind in (FrameType.TOKEN, FrameType.POLL_FOR_MASTER, FrameType.TEST_REQUEST))
 
 
-NEVER_ANSWERED = "postponed, and never answered"
-"""How it ends where the station that promised an answer sends none."""
+class Ending(StrEnum):
+    """How an exchange without an answer ended, where that says more than its verdict."""
+
+    NEVER_ANSWERED = "postponed, and never answered"
 
 
 class RequestParty(NamedTuple):
@@ -52,6 +55,7 @@ class Exchange:
     attempt: int = 1
     of: int | None = None
     postponed: bool = False
+    spoilt: bool = False  # postponed, and what came from there since was damaged: perhaps the answer
     damaged: bool = False  # the request came damaged; its header is whole
     response: int | None = None  # its newest frame, while more segments follow
     latency: Interval | None = None
@@ -75,8 +79,9 @@ class Exchange:
 
     @property
     def is_promised(self) -> bool:
-        """Whether the station itself said that its answer comes later; a router says so for others."""
-        return self.postponed and self.key is not None and self.key.server.net is None
+        """Whether the station itself said that its answer comes later, and nothing damaged may have been it; a router
+        says so for others."""
+        return self.postponed and not self.spoilt and self.key is not None and self.key.server.net is None
 
     def interval(self, answer: Frame) -> Interval:
         """From the end of the request to the begin of the answer, with what the adapter allows."""
@@ -115,7 +120,7 @@ class Exchange:
         if self.usurped:
             return self.close(Verdict.OPEN, error="another station answered")
         if self.response is None:
-            return self.close(Verdict.NO_RESPONSE, error=NEVER_ANSWERED if self.is_promised else None)
+            return self.close(Verdict.NO_RESPONSE, error=Ending.NEVER_ANSWERED.value if self.is_promised else None)
         return self.close(Verdict.OPEN, error="its segments stopped before the last one")
 
     def close(

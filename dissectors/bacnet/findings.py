@@ -8,7 +8,7 @@ from dissectors.bacnet.broken_promises import BrokenPromises
 from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.device_instances import DeviceInstances
-from dissectors.bacnet.exchange import NEVER_ANSWERED
+from dissectors.bacnet.exchange import Ending
 from dissectors.bacnet.findings_of_astray_polls import astray
 from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_hearing import hearing, takes_unheard, unheard_share
@@ -272,7 +272,7 @@ class MstpFindings:
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed; the ring model has its own view of them, but for error answers."""
         station, verdict = transaction.station, transaction.verdict
-        if station is not None and transaction.error == NEVER_ANSWERED:
+        if station is not None and transaction.error == Ending.NEVER_ANSWERED:
             self._promises.add(station, transaction)
         if station is None or transaction.is_passing or verdict not in _ANSWERED:
             return
@@ -306,8 +306,8 @@ class MstpFindings:
         told &= np.isin(closed.verdict, [VERDICTS.index(verdict) for verdict in _ANSWERED])
         kinds = list(counted(closed.station[told], closed.kind[told]))
         refused = closed.verdict == VERDICTS.index(Verdict.EXCEPTION)
-        if NEVER_ANSWERED in closed.names:
-            for place in np.flatnonzero(closed.error == closed.names.index(NEVER_ANSWERED)).tolist():
+        if Ending.NEVER_ANSWERED in closed.names:
+            for place in np.flatnonzero(closed.error == closed.names.index(Ending.NEVER_ANSWERED)).tolist():
                 self._promises.add(int(closed.station[place]), rows.transaction(place))
         full = len(self._refusals.asked) + len(kinds) > REFUSED_KEPT
         before = self._newest[-1:]

@@ -70,6 +70,12 @@ class OpenExchanges:
             _, oldest = self._postponed.popitem(last=False)
             closed.append(self._stop(oldest))
 
+    def _note_spoilt(self, source: int | None, destination: int | None) -> None:
+        """A damaged frame may be the answer that its sender had postponed; where none is known, anybody's."""
+        for exchange in self._postponed.values():
+            if source in (None, exchange.destination) and destination in (None, exchange.source):
+                exchange.spoilt = True
+
     # What time alone ends
 
     def _expire(self, now: int) -> list[Transaction]:

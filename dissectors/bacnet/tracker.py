@@ -223,6 +223,7 @@ class MstpTracker(DataExchanges):
     def _damaged(self, no: int, frame: Frame, header: Header, closed: list[Transaction]) -> Placement:
         header = self._named(frame, header)
         source, waiting = header.source, self._waiting
+        self._note_spoilt(source, header.destination)
         if waiting is not None and waiting.is_token:
             self._waiting = None
             used = source == waiting.destination

@@ -71,3 +71,9 @@ def test_a_router_does_not_promise_for_itself() -> None:
     found, verdicts = _read([*rounds(2, 3, 9), *steps, *_SILENCE])
     assert not found
     assert Verdict.NO_RESPONSE in verdicts
+
+
+def test_an_answer_that_came_damaged_was_sent() -> None:
+    silence, octets = _value(0)
+    spoilt = octets[:-1] + bytes((octets[-1] ^ 1,))
+    assert _read([*rounds(2, 3, 9), *_asked(0, (silence, spoilt)), *_SILENCE]) == ([], [Verdict.NO_RESPONSE])
