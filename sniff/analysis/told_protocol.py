@@ -109,7 +109,7 @@ def told_by(session: Session, only: str | None = None) -> Told:
     readings = _readings(session, registry.usable() if only is None else [registry.get(only)])
     covered = max((one.covered for one in readings if one.frames), default=0.0)
     if only is None and covered < COVERED_LEAST:
-        # a log of a gateway, then, if that explains more: a request with its CRC can look like a header of Modbus TCP
+        # a log of a gateway, then, if that explains more: a request with its CRC may look like the head of such a frame
         readings += [one for one in _readings(session, registry.relatives()) if one.covered > covered]
     readings.sort(key=lambda one: (one.bits, one.octets * one.covered), reverse=True)
     best = next((one for one in readings if one.frames), None)
