@@ -124,7 +124,8 @@ SHAPES: tuple[Shape, ...] = (
            Role.NOTHING),
     _shape("node-modbus-serial", r"\bdata: <Buffer (?P<octets>[0-9a-f ]+?)(?P<cut> \.\.\.[^>]*)?>"),
     _shape("node-modbus-serial", r"\bbuffer: <Buffer", Role.SAME),
-    _shape("node-modbus-serial", r"<Buffer (?P<octets>[0-9a-f ]+?)(?P<cut> \.\.\.[^>]*)?>", Role.PERHAPS),
+    _shape("jsmodbus", r"\brtu-response address \d+ buffer <Buffer", Role.SAME),
+    _shape("node-modbus-serial", r"<Buffer (?P<octets>[0-9a-f ]+?)(?P<cut> \.\.\.[^>]*)?(?:>|\s*$)", Role.PERHAPS),
     _shape("node-modbus-serial", r"\"type\":\s*\"Buffer\",\s*\"data\":\s*(?P<octets>\[[\d,\s]+\])", Role.PERHAPS,
            base=10),
     _shape("QModMaster", rf"\[(?:RTU|ASCII|TCP)\]>\s*(?P<way>[TR]x)\s*>\s*{_S}\s*-"),
@@ -161,7 +162,7 @@ SHAPES: tuple[Shape, ...] = (
 
 _OF_TSHARK = "the capture itself, or `tshark -x` of it"
 
-BUFFER = re.compile(r"\bProcessing:$|~-handler buffer$")
+BUFFER = re.compile(r"\bProcessing:$|~-handler buffer(?: ~Buffer)?$")
 """Labels of known tools (pymodbus, jsmodbus) that tell a buffer: what waits in it, and what came to that."""
 
 DECODED = (

@@ -317,6 +317,21 @@ def too_long() -> list[Step]:
     return [*once, (9, data(31, 12, "0100" + name))] * 3 + rounds(3, 12, 31)
 
 
+def polls_astray() -> list[Step]:
+    """40, the last of its ring, looks below its own address instead of behind it."""
+    steps: list[Step] = []
+    for to in (9, 10, 11, 12):
+        steps += [*rounds(4, 5, 40), (2, token(5, 40)), (2, poll(40, to)), (25, token(40, 5))]
+    return steps + rounds(4, 5, 40)
+
+
+def two_ways_to_one_network() -> list[Step]:
+    """4 and 6 both say that they lead to networks 2001 and 2002."""
+    announced = "01800107d107d2"
+    once = [*rounds(3, 4, 6, 20), (2.0, data(4, 255, announced)), (2, token(4, 6)), (2, data(6, 255, announced))]
+    return [*once, (2, token(6, 20)), (2, token(20, 4))] * 3 + rounds(3, 4, 6, 20)
+
+
 def token_to_itself() -> list[Step]:
     """3 believes to be alone, and passes the token to itself; the adapter hides how soon."""
     return [(4 + at % 3 * 9, token(3, 3)) for at in range(60)]
@@ -355,6 +370,8 @@ MADE = {
     "ms-tp-parameters-that-do-not-fit": misfits,
     "ms-tp-postponed-and-never-answered": never_answered,
     "ms-tp-answers-longer-than-asked-for": too_long,
+    "ms-tp-polls-beyond-its-successor": polls_astray,
+    "ms-tp-two-routers-to-one-network": two_ways_to_one_network,
     "ms-tp-token-to-itself-behind-an-adapter": token_to_itself,
 }
 
