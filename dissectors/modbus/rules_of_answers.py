@@ -227,7 +227,19 @@ ANSWER_RULES = (
         "a driver that is released before the last octet is out, or a device that ends its frames with CR alone; "
         "others may wait for the LF and drop the frame",
         "its turnaround or transmit-delay setting, a converter's timer for the direction; its end character",
-        explains=("MB001", "MB104", "MB105", "MB009", "MB022", "LN003", "LN202", "LN203", "LN204", *_OF_DAMAGE),
+        explains=(
+            "MB001",
+            "MB104",
+            "MB105",
+            "MB009",
+            "MB022",
+            "LN003",
+            "LN202",
+            "LN203",
+            "LN204",
+            "LN207",
+            *_OF_DAMAGE,
+        ),
     ),
     Rule(
         "MB020",
