@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Protocol
 
 from dissectors.findings import Finding
@@ -62,7 +62,7 @@ LiveTables = Table | Output | LineEvent | Status | Ended
 class BusListener(Protocol):
     """Somebody who is told what becomes known of running buses. Called by whoever polls: must not wait for anything."""
 
-    def on_samples(self, live: LiveBus, samples: list[Sample]) -> None:
+    def on_samples(self, live: LiveBus, samples: Sequence[Sample]) -> None:
         """Values were read."""
 
     def on_derived(self, live: LiveBus, messages: list[DerivedMessage]) -> None:

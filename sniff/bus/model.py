@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +13,12 @@ from sniff.analysis.health import HealthReport, health_of
 from sniff.analysis.judging import Judging, LineJudging
 from sniff.analysis.load import KEPT_SECONDS
 from sniff.analysis.summary import Summary
-from sniff.bus.telling_rows import telling_rows, telling_transactions
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, Session
 
 if TYPE_CHECKING:
     from dissectors.token_ring import RingWindow
+    from sniff.analysis.point_columns import TableSamples
     from sniff.analysis.point_reader import PointReader, Sample
     from sniff.analysis.points import PointTable
     from sniff.analysis.polls import Polls
@@ -40,10 +40,9 @@ def _nobody() -> None:
 class BusModel:
     """What is counted, found and measured on one bus.
 
-    `summary`: counts, stations, load. `judging`: the rules. `samples`: values that the newest output completed.
-    `version` changes whenever anything changed. `reads_points`: whether values and requests are read at all.
-    `is_early`: of a live bus, whether it was listened to for so short a time that silence says nothing of it;
-    `listened_until`: ns, up to when, None where nobody listens.
+    `summary`: counts, stations, load. `judging`: the rules. `version` changes whenever anything changed.
+    `reads_points`: whether values and requests are read at all. `is_early`: of a live bus, whether it was listened to
+    for so short a time that silence says nothing of it; `listened_until`: ns, up to when, None where nobody listens.
     """
 
     def __init__(
@@ -58,7 +57,7 @@ class BusModel:
         self.reads_points = with_points
         self.devices = devices or Devices()
         self.summary = Summary(session.line, kept_seconds=kept_seconds)
-        self.samples: list[Sample] = []
+        self._fresh: list[Sample] | TableSamples = []
         self.is_early: Callable[[], bool] = _never
         self.listened_until: Callable[[], int | None] = _nobody
         self.version = 0
@@ -121,8 +120,9 @@ class BusModel:
         self.summary.add(output)
         self.judging.add(output)
         if self.reads_points:
-            self.samples = self.reader.add(output)
-            self._take_samples()
+            self._fresh = self.reader.add(output)
+            self.points.add(self._fresh)
+            self.series.add(one for one in self._fresh if self._is_undescribed(one))
             self.polls.add(output)
 
     def add_table(self, table: Table) -> None:
@@ -131,15 +131,24 @@ class BusModel:
         self.summary.add_table(table)
         self.judging.add_table(table)
         if self.reads_points:
-            self.samples = self.reader.add(telling_rows(table, telling_transactions(table)))
-            self._take_samples()
+            from sniff.analysis.point_columns import TableSamples, add_to
+            from sniff.analysis.table_points import samples_of
+
+            self._fresh = samples = samples_of(self.reader, table)
+            add_to(self.points, samples)
+            undescribed = [one for one in samples.others if self._is_undescribed(one[1])]
+            self.series.add_samples(TableSamples(samples.plain, undescribed))
             self.polls.add_table(table)
 
-    def _take_samples(self) -> None:
-        self.points.add(self.samples)
-        undescribed = [one for one in self.samples if self.devices.at(one.device) is None]
-        if undescribed:
-            self.series.add(undescribed)
+    @property
+    def samples(self) -> Sequence[Sample]:
+        """Values that the newest rows completed, in their order."""
+        if not isinstance(self._fresh, list):
+            self._fresh = list(self._fresh.in_order())
+        return self._fresh
+
+    def _is_undescribed(self, sample: Sample) -> bool:
+        return self.devices.at(sample.device) is None
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""

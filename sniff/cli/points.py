@@ -289,7 +289,7 @@ class _Values(watching.Listener):
         """Over a hole there is no interval."""
         _happen(self.points, event)
 
-    def on_samples(self, live: LiveBus, samples: list[Sample]) -> None:
+    def on_samples(self, live: LiveBus, samples: Sequence[Sample]) -> None:
         """Keep them, or print them."""
         from sniff.analysis.guessed_points import Guessing
         from sniff.analysis.point_columns import TableSamples, no_samples

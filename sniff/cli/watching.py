@@ -78,7 +78,7 @@ def start(args: argparse.Namespace, port: str) -> LiveBus:
 class Listener:
     """A `BusListener` that hears nothing; for those who want some of it."""
 
-    def on_samples(self, live: LiveBus, samples: list[Sample]) -> None:
+    def on_samples(self, live: LiveBus, samples: Sequence[Sample]) -> None:
         """Values were read."""
 
     def on_derived(self, live: LiveBus, messages: list[DerivedMessage]) -> None:

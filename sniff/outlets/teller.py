@@ -101,7 +101,7 @@ class Teller:
         self.lives[live.bus] = live
         self._state(live, live.link.clock.now(), True, "")
 
-    def on_samples(self, live: LiveBus, samples: list[Sample]) -> None:
+    def on_samples(self, live: LiveBus, samples: Sequence[Sample]) -> None:
         """Tell values, or have them wait."""
         about = self._buses[live.bus].about
         for pace in self._paces:
