@@ -8,7 +8,7 @@ and names the plug-in (`plugin_at`).
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING
@@ -107,6 +107,11 @@ def _plugged_points() -> tuple[EntryPoint, ...]:
 def _points(read: Callable[..., Iterable[EntryPoint]], path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
     """Reads the metadata of every installed package, which takes milliseconds: whoever has a row may ask."""
     return tuple(read(group=GROUP))
+
+
+def neighbours(octets: bytes) -> Iterator[str]:
+    """What octets are of that no protocol here reads, by those with frames of the same form."""
+    return filter(None, (one.neighbour(octets) for one in usable()))
 
 
 def usable() -> tuple[Dissector, ...]:

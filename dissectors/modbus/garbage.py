@@ -113,10 +113,10 @@ def is_bad_copy(request: bytes, octets: bytes) -> bool:
     sent, came = int.from_bytes(request, "big"), int.from_bytes(octets, "big")
     if (sent ^ came).bit_count() < _CHANGED_LEAST:
         return False
-    kept = (
-        sent.bit_count() if sent & came == sent else 8 * len(request) - sent.bit_count() if sent | came == sent else 0
-    )
-    return kept >= _KEPT_LEAST
+    if sent & came == sent:  # no 1 was read as 0
+        return sent.bit_count() >= _KEPT_LEAST
+    zeros = 8 * len(request) - sent.bit_count()
+    return sent | came == sent and zeros >= _KEPT_LEAST
 
 
 def _are_of_two_levels(stretches: Sequence[bytes]) -> bool:

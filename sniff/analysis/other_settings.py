@@ -126,7 +126,7 @@ def _by_parity(sample: Sequence[Chunk], bus: LineSettings, line: LineSettings, l
 def _by_neighbour(sample: Sequence[Chunk], who: str) -> Iterator[Fit]:
     """Another protocol, which nobody here reads, with frames of the form of one that is known."""
     octets = b"".join(chunk.octets for chunk in sample)
-    for said in filter(None, (dissector.neighbour(octets) for dissector in registry.usable())):
+    for said in registry.neighbours(octets):
         yield Fit(f"these octets are of {said}", f"{who} {said}", "a program that reads it; this one does not")
 
 

@@ -141,7 +141,7 @@ def _before_answers(finding: Finding, ahead: Counter[str], senders: Senders) -> 
     if not alone or others < AHEAD_LEAST:
         return told
     settle = "its driver's direction control and turnaround; bias"
-    return replace(told, subject=name, seen=f"{words}", next=settle)
+    return replace(told, subject=name, next=settle)
 
 
 def _of_all(

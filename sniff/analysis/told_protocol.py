@@ -123,7 +123,7 @@ def told_by(session: Session, only: str | None = None) -> Told:
 def _neighbour(session: Session) -> str:
     """What octets of no protocol are of, where one of them has frames of the same form."""
     octets = b"".join(chunk.octets for chunk in session.sample)[:HEARD_MOST]
-    return next((said for one in registry.usable() if (said := one.neighbour(octets))), "")
+    return next(registry.neighbours(octets), "")
 
 
 def _readings(session: Session, protocols: Sequence[Dissector]) -> list[Candidature]:
