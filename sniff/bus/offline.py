@@ -14,6 +14,7 @@ from sniff.engine.observer import Observer, observe, observe_tables
 from sniff.engine.read_source import ReadSource
 from sniff.engine.session import Item, LineEvent, Session
 from sniff.engine.verdict_join import JudgedRow, VerdictJoin, Wanted
+from sniff.engine.whole_capture import whole
 
 if TYPE_CHECKING:
     from sniff.analysis.point_reader import PointReader
@@ -25,23 +26,8 @@ Given = TypeVar("Given", covariant=True)
 
 
 def outputs(items: Iterable[Item], session: Session) -> Iterator[Output | LineEvent]:
-    """Run items through a new engine; line events pass through at their place, a hole before what it ends. Raises
-    CaptureError as `items` does, when all that was whole before the damage has been given."""
-    engine = SessionEngine(session)
-    try:
-        for item in items:
-            hole = item if isinstance(item, LineEvent) and item.kind.is_hole else None
-            if hole is not None:
-                yield hole
-            output = engine.take(item)
-            if output:
-                yield output
-            if isinstance(item, LineEvent) and hole is None:
-                yield item
-    except CaptureError:
-        yield engine.close()
-        raise
-    yield engine.close()
+    """Run items through a new engine, as `whole` does."""
+    yield from whole(SessionEngine(session), items)
 
 
 def survey(capture: ReadSource, session: Session, *observers: Observer, reference: bool = False) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import heapq
 import sys
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
@@ -17,18 +18,14 @@ from sniff.analysis.sanitizing import sanitized
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.cli.progress import Watched
 from sniff.engine.capture import BlockWriter, CaptureError, CaptureWriter
-from sniff.engine.engine import Output
-from sniff.engine.follow_settings import dissector_for, engine_for
 from sniff.engine.read_source import ReadSource
 from sniff.engine.session import Item, LineEvent, Session
 from sniff.formats import parquet
 from sniff.formats.parquet import Kind, ParquetWriter
 
 if TYPE_CHECKING:
-    from sniff.analysis.point_reader import Sample
-    from sniff.bus.derived_topics import DerivedMessage
+    from sniff.cli.written_results import WrittenResults
     from sniff.engine.blocks import Block
-    from sniff.engine.table import Table
 
 
 def add_output(parser: argparse.ArgumentParser) -> None:
@@ -60,21 +57,16 @@ def write(
     counts = _Counts()
     watched = Watched(with_comments(source))
     from sniff.bus.capture_writer import create  # with the formats that are written
-    from sniff.devices import noted_devices
 
     try:
         with create(target, session, options, notes, marks) as writer:
-            takers: list[_Frames | _Values | _Topics] = [_Frames(writer, session)] if with_frames else []
-            known = noted_devices(session) if devices is None else devices
-            if _is_recording(writer):
-                if known:
-                    takers.append(_Values(writer, session, known))
-                if not session.unknown:
-                    takers.append(_Topics(writer, session, known, with_values=not known))
+            results = _results(writer, session, devices, with_frames)
             if isinstance(writer, BlockWriter) and not args.reference:
-                _write_blocks(writer, watched.blocks(), session, takers, counts)
+                blocks = _blocks_written(writer, watched.blocks(), counts)
+                _exhaust(blocks) if results is None else results.take_blocks(blocks)
             else:
-                _write_items(writer, watched.items(), session, takers, counts)
+                items = _items_written(writer, watched.items(), counts)
+                _exhaust(items) if results is None else results.take_items(items)
     except CaptureError as error:
         raise Failure(str(error), UNREADABLE) from None
     print(f"{sanitized(target)}: {counts.octets} octets in {counts.reads} reads", file=sys.stderr)
@@ -110,18 +102,30 @@ class _Counts:
     octets: int = 0
 
 
-def _write_blocks(
-    writer: CaptureWriter,
-    blocks: Iterator[Block | LineEvent],
-    session: Session,
-    takers: Sequence[_Frames | _Values | _Topics],
-    counts: _Counts,
-) -> None:
-    from sniff.engine.bulk import BulkEngine
+def _results(
+    writer: CaptureWriter, session: Session, devices: Devices | None, with_frames: bool
+) -> WrittenResults | None:
+    """What is found and written beside the octets; None where the format takes nothing of it."""
+    from sniff.recording.mcap_writer import McapWriter
 
-    assert isinstance(writer, BlockWriter)
-    engine = BulkEngine(session) if takers else None
-    logs = [taker.log for taker in takers if isinstance(taker, _Frames)]
+    if not isinstance(writer, McapWriter):
+        return None
+    from sniff.cli.written_results import WrittenResults  # with the engine for many rows
+    from sniff.devices import noted_devices
+
+    known = noted_devices(session) if devices is None else devices
+    return WrittenResults(writer, session, known, with_frames) or None
+
+
+def _exhaust(parts: Iterable[object]) -> None:
+    """Have all of them made, for what making them does."""
+    deque(parts, 0)
+
+
+def _blocks_written(
+    writer: BlockWriter, blocks: Iterable[Block | LineEvent], counts: _Counts
+) -> Iterator[Block | LineEvent]:
+    """Each of them, once it is written."""
     for item in blocks:
         if isinstance(item, LineEvent):
             writer.write(item)
@@ -129,52 +133,17 @@ def _write_blocks(
             writer.write_block(item)
             counts.reads += len(item)
             counts.octets += len(item.reads.octets)
-            for log in logs:
-                log.hear_many(item.reads.times)
-        if engine is not None:
-            table = engine.take(item)
-            for taker in takers:
-                if isinstance(item, LineEvent) and item.kind.is_hole:  # before what it ends
-                    taker.add_line_event(item)
-                taker.add_table(table)
-                if isinstance(item, LineEvent) and not item.kind.is_hole:
-                    taker.add_line_event(item)
-    if engine is not None:
-        table = engine.close()
-        for taker in takers:
-            taker.add_table(table)
-            taker.close()
+        yield item
 
 
-def _write_items(
-    writer: CaptureWriter,
-    items: Iterator[Item],
-    session: Session,
-    takers: Sequence[_Frames | _Values | _Topics],
-    counts: _Counts,
-) -> None:
-    engine = engine_for(session) if takers else None
-    logs = [taker.log for taker in takers if isinstance(taker, _Frames)]
+def _items_written(writer: CaptureWriter, items: Iterable[Item], counts: _Counts) -> Iterator[Item]:
+    """The same one by one."""
     for item in items:
         writer.write(item)
         if isinstance(item, Chunk) and item.octets:
             counts.reads += 1
             counts.octets += len(item.octets)
-            for log in logs:
-                log.hear(item.time)
-        if engine is not None:
-            output = engine.take(item)
-            for taker in takers:
-                if isinstance(item, LineEvent) and item.kind.is_hole:  # before what it ends
-                    taker.add_line_event(item)
-                taker.add(output)
-                if isinstance(item, LineEvent) and not item.kind.is_hole:
-                    taker.add_line_event(item)
-    if engine is not None:
-        output = engine.close()
-        for taker in takers:
-            taker.add(output)
-            taker.close()
+        yield item
 
 
 def with_comments(capture: ReadSource) -> ReadSource:
@@ -200,119 +169,3 @@ class Items:
         from sniff.engine.blocks import blocks_of
 
         return blocks_of(self._items)
-
-
-def _is_recording(writer: object) -> bool:
-    """Whether it takes what is derived."""
-    from sniff.recording.mcap_writer import McapWriter
-
-    return isinstance(writer, McapWriter)
-
-
-class _Frames:
-    """Writes what the engine finds to /frames."""
-
-    def __init__(self, writer: object, session: Session) -> None:
-        from sniff.recording.frame_log import FrameLog
-        from sniff.recording.mcap_writer import McapWriter
-
-        assert isinstance(writer, McapWriter)
-        self._writer = writer
-        self.log = FrameLog(session)
-
-    def add(self, output: Output) -> None:
-        self.log.add(output)
-        self._put()
-
-    def add_table(self, table: Table) -> None:
-        self.log.add_table(table)
-        self._put()
-
-    def add_line_event(self, event: LineEvent) -> None:
-        self.log.add_line_event(event)
-        self._put()
-
-    def close(self) -> None:
-        self.log.close()
-        self._put()
-        if (record := self.log.record()) is not None:
-            from sniff.recording.topics import FRAMES_RECORD
-
-            self._writer.note(FRAMES_RECORD, record)
-
-    def _put(self) -> None:
-        made = self.log.take()
-        if made:
-            from sniff.recording.frames import SCHEMA
-
-            self._writer.add_frames(made, SCHEMA)
-
-
-class _Topics:
-    """Writes what a live recording has: /bus, /nodes, /findings, and values unless others do."""
-
-    def __init__(self, writer: object, session: Session, devices: Devices, with_values: bool) -> None:
-        from sniff.bus.offline_topics import OfflineTopics
-        from sniff.recording.mcap_writer import McapWriter
-
-        assert isinstance(writer, McapWriter)
-        self._writer = writer
-        self._topics = OfflineTopics(session, devices, with_values)
-        self._protocol = session.protocol
-        self._next = 1
-
-    def add(self, output: Output) -> None:
-        from sniff.engine.table import Table
-
-        first = output.rows[0].no if output.rows else self._next
-        self._next = first + len(output.rows)
-        self.add_table(Table.of_outputs(self._protocol, first, [output]))
-
-    def add_table(self, table: Table) -> None:
-        self._put(self._topics.add_table(table))
-
-    def add_line_event(self, event: LineEvent) -> None:
-        self._topics.add_line_event(event)
-
-    def close(self) -> None:
-        self._put(self._topics.close())
-
-    def _put(self, messages: Iterable[DerivedMessage]) -> None:
-        for one in messages:
-            self._writer.derived(one.topic, one.schema, one.log_time, one.publish_time, one.data, one.metadata)
-
-
-class _Values:
-    """Writes the values of known devices to /values."""
-
-    def __init__(self, writer: object, session: Session, devices: Devices) -> None:
-        from sniff.analysis.point_reader import PointReader
-        from sniff.bus.value_topics import ValueChannels
-        from sniff.recording.mcap_writer import McapWriter
-
-        assert isinstance(writer, McapWriter)
-        self._writer = writer
-        self._points = PointReader(dissector_for(session), devices)
-        self._channels = ValueChannels(session.bus, devices)
-
-    def add(self, output: Output) -> None:
-        self._put(self._points.add(output))
-
-    def add_table(self, table: Table) -> None:
-        from sniff.analysis.table_points import samples_of
-
-        self._put(samples_of(self._points, table).in_order())
-
-    def add_line_event(self, event: LineEvent) -> None:
-        """Nothing of it is kept here."""
-
-    def close(self) -> None:
-        """Nothing is held."""
-
-    def _put(self, samples: Iterable[Sample]) -> None:
-        for sample in samples:
-            message = self._channels.message(sample)
-            if message is not None:
-                self._writer.derived(
-                    message.topic, message.schema, message.time, message.time, message.data, message.metadata
-                )

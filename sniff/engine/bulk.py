@@ -18,7 +18,6 @@ from dissectors.line import Timing
 from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction
 from sniff.engine.blocks import Block
-from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Engine, Output, Row, without_times
 from sniff.engine.follow_settings import SessionEngine
 from sniff.engine.framing import BulkFraming, Clean, Stretch
@@ -28,6 +27,7 @@ from sniff.engine.placing import Placing, RowsAhead
 from sniff.engine.read_source import ReadSource, stored_tables
 from sniff.engine.session import LineEvent, Session, settings_change
 from sniff.engine.table import Table, joined
+from sniff.engine.whole_capture import whole
 
 FAR = 1 << 61
 """ns; times beyond it are not reckoned with in columns."""
@@ -38,23 +38,9 @@ MANY = 64
 
 
 def tables(blocks: Iterable[Block | LineEvent], session: Session) -> Iterator[Table | LineEvent]:
-    """What a capture holds, as tables; line events pass through at their place, a hole before what it ends. Raises what
-    `blocks` raises, and registry.UnknownProtocol."""
-    engine = BulkEngine(session)
-    try:
-        for item in blocks:
-            hole = item if isinstance(item, LineEvent) and item.kind.is_hole else None
-            if hole is not None:
-                yield hole
-            table = engine.take(item)
-            if table:
-                yield table
-            if isinstance(item, LineEvent) and hole is None:
-                yield item
-    except CaptureError:
-        yield engine.close()
-        raise
-    yield engine.close()
+    """What a capture holds, as tables, put together as `whole` does. Raises what `blocks` raises, and
+    registry.UnknownProtocol."""
+    yield from whole(BulkEngine(session), blocks)
 
 
 def tables_of(capture: ReadSource, session: Session) -> Iterator[Table | LineEvent]:

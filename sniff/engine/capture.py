@@ -31,15 +31,6 @@ class Capture(Protocol):
         ...
 
 
-@runtime_checkable
-class BlockWriter(Protocol):
-    """A capture opened for writing that takes many reads at once."""
-
-    def write_block(self, block: Block) -> None:
-        """Add reads, in order of time; the same as one after the other."""
-        ...
-
-
 class CaptureWriter(Protocol):
     """A capture opened for writing; a context manager. Every item is kept, or the writer says what it cannot keep."""
 
@@ -54,3 +45,12 @@ class CaptureWriter(Protocol):
     def __enter__(self) -> CaptureWriter: ...
 
     def __exit__(self, *exc: object) -> None: ...
+
+
+@runtime_checkable
+class BlockWriter(CaptureWriter, Protocol):
+    """A capture opened for writing that takes many reads at once."""
+
+    def write_block(self, block: Block) -> None:
+        """Add reads, in order of time; the same as one after the other."""
+        ...

@@ -46,6 +46,7 @@ class FrameLog:
         """A read came, ns; before what is found in it."""
         self.fits = self.fits and self._heard <= time <= FAR
         self._heard = time
+        self._is_over = False
 
     def hear_many(self, times: Times) -> None:
         """Reads came, at least one."""
