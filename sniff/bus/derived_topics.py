@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 
 from dissectors.findings import Finding, Severity
 from dissectors.histogram import Histogram
@@ -21,6 +20,7 @@ from sniff.analysis.summary import Summary
 from sniff.bus.model import BusModel
 from sniff.engine.engine import Output
 from sniff.engine.table import Table
+from sniff.recording.derived_message import DerivedMessage
 from sniff.recording.topics import topic_part
 
 WINDOW = NS_PER_S
@@ -41,18 +41,6 @@ _TROUBLE = (
     Verdict.ANSWERED_TWICE,
     Verdict.EXCEPTION,
 )
-
-
-@dataclass(frozen=True, slots=True)
-class DerivedMessage:
-    """One message, as `Recorder.derived` takes it. Times are ns."""
-
-    topic: str
-    schema: str
-    log_time: int
-    publish_time: int
-    data: bytes
-    metadata: dict[str, str] = field(default_factory=dict)
 
 
 class BusChannels:

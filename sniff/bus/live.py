@@ -22,12 +22,11 @@ from sniff.analysis.autodetect import Detecting
 from sniff.analysis.point_reader import PointReader, Sample
 from sniff.analysis.site_ear import SiteEar
 from sniff.bus.autodetect import Search, SearchProgress
-from sniff.bus.derived_topics import NODES_A_SECOND, NODES_AT_ONCE, BusChannels, DerivedMessage
+from sniff.bus.derived_topics import NODES_A_SECOND, NODES_AT_ONCE, BusChannels
 from sniff.bus.model import BusModel
 from sniff.bus.recorded_values import RecordedValues
 from sniff.bus.router import Router, octets_of
 from sniff.bus.thinning import Budget
-from sniff.bus.value_topics import ValueMessage
 from sniff.capture.ipc import Batch, Ended, HeardOctets, ReceivedMessage, Status, Tick, one_by_one
 from sniff.capture.link import CaptureLink
 from sniff.engine.blocks import Block, Gathering, blocks_of
@@ -35,6 +34,7 @@ from sniff.engine.bulk import BulkEngine
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table
+from sniff.recording.derived_message import DerivedMessage
 
 AT_ONCE = 0.2
 """Seconds that one `poll` may spend with the engine."""
@@ -348,22 +348,17 @@ class LiveBus:
             if self._values is not None:
                 read = self.model.reads_points
                 for value in self._values.of_samples(self.model.samples) if read else self._values.of_rows(one):
-                    self._record(value)
+                    self.link.derived(self.bus, value)
             if self._listener is not None and self.model.samples:
                 self._listener.on_samples(self, self.model.samples)
         return items
-
-    def _record(self, value: ValueMessage) -> None:
-        """Send a value back into the file, best effort."""
-        time = value.time
-        self.link.derived(self.bus, value.topic, value.schema, time, time, value.data, value.metadata)
 
     def _send(self, messages: list[DerivedMessage]) -> None:
         """Send statistics and findings back into the file, best effort; tell them to whoever listens."""
         if self._listener is not None:
             self._listener.on_derived(self, messages)
         for one in messages if self.link.paths else ():
-            self.link.derived(self.bus, one.topic, one.schema, one.log_time, one.publish_time, one.data, one.metadata)
+            self.link.derived(self.bus, one)
 
 
 def _row_by_row(items: list[LiveTables]) -> Iterator[LiveItem]:

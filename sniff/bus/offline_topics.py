@@ -14,15 +14,15 @@ import numpy as np
 from dissectors.columns import Times
 from dissectors.profiles import Devices
 from sniff.analysis.summaries import summaries
-from sniff.bus.derived_topics import NODES_A_SECOND, NODES_AT_ONCE, WINDOW, BusChannels, DerivedMessage
+from sniff.bus.derived_topics import NODES_A_SECOND, NODES_AT_ONCE, WINDOW, BusChannels
 from sniff.bus.model import BusModel
 from sniff.bus.recorded_values import RecordedValues
 from sniff.bus.thinning import Budget
-from sniff.bus.value_topics import ValueMessage
 from sniff.bus.watched_ring import WatchedRing
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table
+from sniff.recording.derived_message import DerivedMessage
 
 
 class _Stretch(NamedTuple):
@@ -75,7 +75,7 @@ class OfflineTopics:
                     self._ring.window()  # times that are none belong to no second
             if self._values is not None:
                 self._values.hear(int(table.frames.length.sum()), len(table))
-                yield from map(_value, self._values.of_rows(table))
+                yield from self._values.of_rows(table)
 
     def _stretches(self, ends: Times) -> list[_Stretch]:
         """Of rows that end by `ends`: those of a window each, the last of which is still open."""
@@ -107,11 +107,11 @@ class OfflineTopics:
                 self._channels.add_summary(summary)
                 if values is not None and telling is not None:
                     values.hear(lengths[stop] - lengths[begin], stop - begin)
-                    yield from map(_value, telling.until(stop))
+                    yield from telling.until(stop)
             for now in stretch.over:
                 yield from self._due(now)
         if telling is not None:
-            yield from map(_value, telling.rest())
+            yield from telling.rest()
 
     def close(self) -> Iterator[DerivedMessage]:
         """What is left: the last window and the findings."""
@@ -123,10 +123,6 @@ class OfflineTopics:
         if self._values is not None:
             self._values.pass_time(now)
         return self._channels.due(now, self._nodes.take)
-
-
-def _value(value: ValueMessage) -> DerivedMessage:
-    return DerivedMessage(value.topic, value.schema, value.time, value.time, value.data, value.metadata)
 
 
 def _windows_over(end: int, following: int) -> tuple[int, ...]:

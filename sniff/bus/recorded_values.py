@@ -12,9 +12,10 @@ from dissectors.profiles import Devices
 from sniff.analysis.point_reader import PointReader, Sample
 from sniff.bus.telling_rows import telling_rows, telling_transactions
 from sniff.bus.thinning import Budget, Room
-from sniff.bus.value_topics import ValueChannels, ValueMessage
+from sniff.bus.value_topics import ValueChannels
 from sniff.engine.engine import Output
 from sniff.engine.table import Table
+from sniff.recording.derived_message import DerivedMessage
 
 VALUES_AT_ONCE = 4000
 MOST_REQUESTS = 1 << 14
@@ -44,14 +45,14 @@ class RecordedValues:
         """It is `now` (ns)."""
         self._budget.settle(now, self._room.rate(now))
 
-    def of_samples(self, samples: Iterable[Sample]) -> Iterator[ValueMessage]:
+    def of_samples(self, samples: Iterable[Sample]) -> Iterator[DerivedMessage]:
         """Those that are to be written."""
         for sample in samples:
             message = self._channels.message(sample, self._budget.take)
             if message is not None:
                 yield message
 
-    def of_rows(self, rows: Table | Output) -> Iterator[ValueMessage]:
+    def of_rows(self, rows: Table | Output) -> Iterator[DerivedMessage]:
         """The same of the values that rows hold."""
         return self.of_table(rows).rest() if isinstance(rows, Table) else self.of_samples(self._reader.add(rows))
 
@@ -59,7 +60,7 @@ class RecordedValues:
         """The same of a table, a stretch at a time; all of it is to be taken before what follows."""
         return TableValues(self, table)
 
-    def of_exchange(self, asked: bytes, time: int, read: Callable[[], Output]) -> Iterator[ValueMessage]:
+    def of_exchange(self, asked: bytes, time: int, read: Callable[[], Output]) -> Iterator[DerivedMessage]:
         """Those of an exchange that closed at `time` (ns); it is only read where some of it may have its turn.
 
         `asked`: what its request asks (`stems`), by which it is known what points it tells; b"" where that is not at
@@ -110,14 +111,14 @@ class TableValues:
         self._request, self._response, self._ended = closed.request, closed.response, closed.end
         self._next = 0
 
-    def until(self, stop: int) -> Iterator[ValueMessage]:
+    def until(self, stop: int) -> Iterator[DerivedMessage]:
         """Those of exchanges that rows before `stop` closed, and that were not given before."""
         while self._next < len(self._telling) and self._closed_by[self._next] < stop:
             at, asked = self._telling[self._next], self._stems[self._next]
             self._next += 1
             yield from self._values.of_exchange(asked, int(self._ended[at]), partial(self._exchange, at))
 
-    def rest(self) -> Iterator[ValueMessage]:
+    def rest(self) -> Iterator[DerivedMessage]:
         """All others; what is still open is remembered."""
         yield from self.until(len(self._table) + 1)
         self._values.remember(telling_rows(self._table, ()))

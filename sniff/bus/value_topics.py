@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from dissectors.profiles import Devices
 from dissectors.profiles.model import Entry
 from sniff.analysis.point_reader import Sample
+from sniff.recording.derived_message import DerivedMessage
 from sniff.recording.topics import topic_part
 
 MOST_CHANNELS = 4096
@@ -17,17 +17,6 @@ MOST_CHANNELS = 4096
 
 NUMBERS, TEXTS = "sniff485.Value", "sniff485.TextValue"
 """Schema records, of `sniff.recording.topics`."""
-
-
-@dataclass(frozen=True, slots=True)
-class ValueMessage:
-    """One message, as `Recorder.derived` takes it. `metadata` is of its channel."""
-
-    topic: str
-    schema: str
-    time: int
-    data: bytes
-    metadata: dict[str, str]
 
 
 class ValueChannels:
@@ -55,7 +44,7 @@ class ValueChannels:
         """Whether a point has a channel, or may still get one."""
         return topic in self._schemas or len(self._schemas) < MOST_CHANNELS
 
-    def message(self, sample: Sample, wanted: Callable[[str, int], bool] = lambda *_: True) -> ValueMessage | None:
+    def message(self, sample: Sample, wanted: Callable[[str, int], bool] = lambda *_: True) -> DerivedMessage | None:
         """The message of a sample; None when there is nothing to write. `wanted`: whether a topic has its turn then."""
         value = sample.value
         text = isinstance(value.value, str)
@@ -79,7 +68,8 @@ class ValueChannels:
         if value.raw is None:
             del content["raw"]
         content |= {"quality": int(value.quality), "frame": sample.frame}
-        return ValueMessage(topic, schema, sample.time, json.dumps(content).encode(), self._metadata[topic])
+        time, data = sample.time, json.dumps(content).encode()
+        return DerivedMessage(topic, schema, time, time, data, self._metadata[topic])
 
     def _describe(self, sample: Sample) -> dict[str, str]:
         value, entry = sample.value, sample.value.entry

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dissectors.frame import Chunk, LineError, Mark
 from sniff.engine.session import Item, LineEvent, LineEventKind
+from sniff.recording.derived_message import DerivedMessage
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
@@ -125,19 +126,6 @@ Batch = HeardOctets | Message
 """What comes of many reads at a time."""
 
 
-@dataclass(frozen=True, slots=True)
-class Derived:
-    """A result of the engine on its way into the file."""
-
-    bus: int
-    topic: str
-    schema_name: str
-    log_time: int
-    publish_time: int
-    data: bytes
-    metadata: dict[str, str] | None = None
-
-
 _FRAME = struct.Struct("<IBB")
 _CHUNK = struct.Struct("<qH")
 _COUNT = struct.Struct("<I")
@@ -220,12 +208,12 @@ def encode_status(status: Status) -> bytes:
     return encode_json(IpcKind.STATUS, asdict(status), status.bus)
 
 
-def encode_derived(derived: Derived) -> bytes:
+def encode_derived(bus: int, derived: DerivedMessage) -> bytes:
     """A result on its way into the file."""
-    topic, schema = derived.topic.encode(), derived.schema_name.encode()
-    metadata = json.dumps(derived.metadata).encode() if derived.metadata else b""
+    topic, schema = derived.topic.encode(), derived.schema.encode()
+    metadata = json.dumps(dict(derived.metadata)).encode() if derived.metadata else b""
     head = _DERIVED.pack(derived.log_time, derived.publish_time, len(topic), len(schema), len(metadata))
-    return encode(IpcKind.DERIVED, derived.bus, head + topic + schema + metadata + derived.data)
+    return encode(IpcKind.DERIVED, bus, head + topic + schema + metadata + derived.data)
 
 
 def encode_trigger(bus: int, time: int, text: str, kind: IpcKind = IpcKind.TRIGGER) -> bytes:
@@ -308,7 +296,7 @@ def _decode_chunk(body: bytes) -> Chunk:
     return Chunk(time, body[end:], marks)
 
 
-def decode_derived(bus: int, body: bytes) -> Derived:
+def decode_derived(body: bytes) -> DerivedMessage:
     """A result on its way into the file. Raises IpcError."""
     try:
         log_time, publish_time, *lengths = _DERIVED.unpack_from(body)
@@ -318,10 +306,10 @@ def decode_derived(bus: int, body: bytes) -> Derived:
             parts.append(body[begin : begin + length])
             begin += length
         topic, schema = parts[0].decode(), parts[1].decode()
-        metadata = {str(key): str(value) for key, value in decode_json(parts[2]).items()} if parts[2] else None
+        metadata = {str(key): str(value) for key, value in decode_json(parts[2]).items()} if parts[2] else {}
     except (struct.error, ValueError) as error:
         raise IpcError(f"result: {error}") from error
-    return Derived(bus, topic, schema, log_time, publish_time, body[begin:], metadata)
+    return DerivedMessage(topic, schema, log_time, publish_time, body[begin:], metadata)
 
 
 def decode_json(body: bytes) -> dict[str, Any]:

@@ -16,7 +16,6 @@ from sniff.capture.ending import awaited_exit_code, exit_code, in_words
 from sniff.capture.ipc import (
     LOSSY,
     Batch,
-    Derived,
     Ended,
     IpcError,
     IpcKind,
@@ -37,6 +36,7 @@ from sniff.capture.ipc import (
 from sniff.capture.spawn import Spawned, spawn
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Session, SettingsChange
+from sniff.recording.derived_message import DerivedMessage
 from sniff.sources import PortError
 from sniff.sources.clock import Clock
 
@@ -306,21 +306,12 @@ class CaptureLink:
 
     # -- sending -----------------------------------------------------------------------------------------------
 
-    def derived(
-        self,
-        bus: int,
-        topic: str,
-        schema_name: str,
-        log_time: int,
-        publish_time: int,
-        data: bytes,
-        metadata: dict[str, str] | None = None,
-    ) -> bool:
-        """Send a result back into the file, best effort; whether it is on its way. Arguments as `Recorder.derived`."""
+    def derived(self, bus: int, derived: DerivedMessage) -> bool:
+        """Send a result back into the file, best effort; whether it is on its way."""
         if not self._sending or len(self._unsent) > DERIVED_BACKLOG:
             self.derived_dropped += 1
             return False
-        self._unsent += encode_derived(Derived(bus, topic, schema_name, log_time, publish_time, data, metadata))
+        self._unsent += encode_derived(bus, derived)
         self._send()
         return True
 

@@ -401,18 +401,10 @@ class CaptureLoop:
         elif kind in (IpcKind.MARK, IpcKind.UNMARK) and bus < len(self._buses):
             self._mark(bus, LineEventKind.MARK if kind == IpcKind.MARK else LineEventKind.UNMARK, *decode_trigger(body))
         elif kind == IpcKind.DERIVED and bus < len(self.recorders):
-            derived = decode_derived(bus, body)
+            derived = decode_derived(body)
             ring = self._buses[bus].ring
-            if ring is not None and not ring.keeps(derived.log_time):
-                return
-            self.recorders[bus].derived(
-                derived.topic,
-                derived.schema_name,
-                derived.log_time,
-                derived.publish_time,
-                derived.data,
-                derived.metadata,
-            )
+            if ring is None or ring.keeps(derived.log_time):
+                self.recorders[bus].derived(derived)
         elif kind == IpcKind.RECONFIGURE and bus < len(self._buses):
             source = self._buses[bus].source
             line = body.decode("ascii", "replace")

@@ -17,9 +17,9 @@ from sniff.formats.table import is_named_so
 
 if TYPE_CHECKING:
     from sniff.analysis.point_reader import Sample
-    from sniff.bus.derived_topics import DerivedMessage
     from sniff.bus.live import LiveBus, LiveItem, LiveTables
     from sniff.engine.session import LineEvent
+    from sniff.recording.derived_message import DerivedMessage
 
 OTHER_SCREEN, THIS_SCREEN = "\x1b[?1049h\x1b[?7l", "\x1b[?7h\x1b[?1049l"
 """A terminal's second screen, with lines that end where it does; and back."""

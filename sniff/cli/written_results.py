@@ -9,7 +9,6 @@ from dissectors.frame import Chunk
 from dissectors.profiles import Devices
 from sniff.analysis.point_reader import PointReader, Sample
 from sniff.analysis.table_points import samples_of
-from sniff.bus.derived_topics import DerivedMessage
 from sniff.bus.offline import outputs
 from sniff.bus.offline_topics import OfflineTopics
 from sniff.bus.value_topics import ValueChannels
@@ -20,6 +19,7 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import observe, observe_tables
 from sniff.engine.session import Item, LineEvent, Session
 from sniff.engine.table import Table
+from sniff.recording.derived_message import DerivedMessage
 from sniff.recording.frame_log import FrameLog
 from sniff.recording.frames import SCHEMA
 from sniff.recording.mcap_writer import McapWriter
@@ -128,7 +128,7 @@ class _Topics:
 
     def _put(self, messages: Iterable[DerivedMessage]) -> None:
         for one in messages:
-            self._writer.derived(one.topic, one.schema, one.log_time, one.publish_time, one.data, one.metadata)
+            self._writer.derived(one)
 
 
 class _Values:
@@ -155,6 +155,4 @@ class _Values:
         for sample in samples:
             message = self._channels.message(sample)
             if message is not None:
-                self._writer.derived(
-                    message.topic, message.schema, message.time, message.time, message.data, message.metadata
-                )
+                self._writer.derived(message)

@@ -14,12 +14,12 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from sniff.bus.derived_topics import DerivedMessage
-from sniff.bus.value_topics import ValueChannels, ValueMessage
+from sniff.bus.value_topics import ValueChannels
 from sniff.capture.spawn import environment
 from sniff.outlet_settings import ListenSettings, SettingsError
 from sniff.outlets.outlet import AT_THE_END, Outlet
 from sniff.outlets.told import LogTold, NumbersTold, Told, ToldBus, ValueTold
+from sniff.recording.derived_message import DerivedMessage
 from sniff.recording.topics import SCHEMAS
 
 MOST_CHANNELS = 20_000
@@ -98,7 +98,7 @@ class FoxgloveOutlet(Outlet):
     def _lines(self, told: Told) -> Iterator[bytes]:
         """What the process is told: a channel when it is new, and a message."""
         if isinstance(told, ValueTold):
-            message: ValueMessage | DerivedMessage | None = self._values_of(told.bus).message(told.sample)
+            message: DerivedMessage | None = self._values_of(told.bus).message(told.sample)
         else:
             message = told.message if isinstance(told, NumbersTold | LogTold) else None
         if message is None:
@@ -116,11 +116,10 @@ class FoxgloveOutlet(Outlet):
                     "schema": schema.name,
                     "encoding": schema.encoding,
                     "text": schema.text,
-                    "metadata": message.metadata,
+                    "metadata": dict(message.metadata),
                 }
             )
-        time = message.time if isinstance(message, ValueMessage) else message.log_time
-        yield _line({"c": number, "t": max(0, time), "d": message.data.decode()})
+        yield _line({"c": number, "t": max(0, message.log_time), "d": message.data.decode()})
 
     def _values_of(self, bus: ToldBus) -> ValueChannels:
         known = self._values.get(bus.name)

@@ -15,11 +15,12 @@ from dissectors.line import NS_PER_S
 from sniff.analysis.point_reader import Sample
 from sniff.analysis.points import MOST_POINTS
 from sniff.analysis.sanitizing import sanitized
-from sniff.bus.derived_topics import NODE, DerivedMessage
+from sniff.bus.derived_topics import NODE
 from sniff.bus.live import LiveBus
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.outlets.news import NewsDesk
 from sniff.outlets.told import FindingTold, LogTold, NumbersTold, StateTold, Told, ToldBus, ValueTold
+from sniff.recording.derived_message import DerivedMessage
 
 LOOK_EVERY = NS_PER_S
 """ns between two looks at the findings of a bus."""

@@ -9,8 +9,8 @@ from functools import cached_property
 
 from dissectors.profiles import Devices
 from sniff.analysis.point_reader import Sample
-from sniff.bus.derived_topics import DerivedMessage
 from sniff.outlets.news import News
+from sniff.recording.derived_message import DerivedMessage
 
 
 @dataclass(frozen=True, slots=True)

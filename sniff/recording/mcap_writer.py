@@ -11,8 +11,9 @@ from sniff.engine.session import Item, LineEvent, Session
 from sniff.formats.files import NewFile, explain
 from sniff.recording.batcher import Batcher
 from sniff.recording.block_batches import add_block
+from sniff.recording.derived_message import DerivedMessage
 from sniff.recording.part import PartFile
-from sniff.recording.topic_message import Message, stamp
+from sniff.recording.topic_message import Message, of_derived, stamp
 from sniff.recording.topics import FRAMES, LINE, RAW, SchemaText
 
 if TYPE_CHECKING:
@@ -54,21 +55,11 @@ class McapWriter:
         self._part = PartFile(file.stream, sessions, place.number, place.before())
         self._sequences: dict[str, int] = {}
 
-    def derived(
-        self,
-        topic: str,
-        schema_name: str,
-        log_time: int,
-        publish_time: int,
-        data: bytes,
-        metadata: Mapping[str, str] | None = None,
-    ) -> None:
-        """Add a result of the engine; arguments as `Recorder.derived` takes them. Raises CaptureError."""
-        if topic in (RAW, LINE):
+    def derived(self, one: DerivedMessage) -> None:
+        """Add a result of the engine. Raises CaptureError."""
+        if one.topic in (RAW, LINE):
             return
-        sequence = self._sequences.get(topic, 0)
-        self._sequences[topic] = (sequence + 1) % (1 << 32)
-        self._part.hold(Message(topic, stamp(log_time), stamp(publish_time), sequence, data), schema_name, metadata)
+        self._part.hold(of_derived(one, self._sequences), one.schema, one.metadata)
         if self._part.holds_enough:
             self._part.release()
 

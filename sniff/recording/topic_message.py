@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from sniff.recording.derived_message import DerivedMessage
+
 _U64 = 1 << 64
 
 
@@ -16,6 +18,13 @@ class Message:
     publish_time: int
     sequence: int
     data: bytes
+
+
+def of_derived(one: DerivedMessage, sequences: dict[str, int]) -> Message:
+    """The message of a result, with the next number of its topic, which is counted in `sequences`."""
+    number = sequences.get(one.topic, 0)
+    sequences[one.topic] = (number + 1) % (1 << 32)
+    return Message(one.topic, stamp(one.log_time), stamp(one.publish_time), number, one.data)
 
 
 def stamp(time: int) -> int:

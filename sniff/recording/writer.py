@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -28,9 +28,10 @@ from sniff.engine.session import (
 )
 from sniff.recording import writer_thread
 from sniff.recording.batcher import Batcher
+from sniff.recording.derived_message import DerivedMessage
 from sniff.recording.line_messages import loss_message
 from sniff.recording.rotation import Rotation
-from sniff.recording.topic_message import Message, stamp
+from sniff.recording.topic_message import Message, of_derived
 from sniff.recording.topics import LINE, RAW
 from sniff.recording.writer_thread import CHECK, CLOSE, SYNC, Changed, Flush, Keeper, WriteBatch
 
@@ -172,24 +173,13 @@ class Recorder:
         self._note(event.time)
         self._step(event.time)
 
-    def derived(
-        self,
-        topic: str,
-        schema_name: str,
-        log_time: int,
-        publish_time: int,
-        data: bytes,
-        metadata: Mapping[str, str] | None = None,
-    ) -> None:
-        """Record a result of the engine, best effort. `schema_name`: one of `topics.SCHEMAS`; `metadata`: of the
-        channel, taken when the topic is new in a file. /raw and /line are not for results."""
-        if self._closed or topic in (RAW, LINE) or self._full(writer_thread.MOST_DERIVED):
+    def derived(self, one: DerivedMessage) -> None:
+        """Record a result of the engine, best effort."""
+        if self._closed or one.topic in (RAW, LINE) or self._full(writer_thread.MOST_DERIVED):
             return
-        sequence = self._sequences.get(topic, 0)
-        self._sequences[topic] = (sequence + 1) % (1 << 32)
-        message = Message(topic, stamp(log_time), stamp(publish_time), sequence, data)
-        self._send(WriteBatch([message], 0, self._batcher.first, schema_name, metadata, self._bus))
-        self._note(log_time if self._now is None else self._now)
+        message = of_derived(one, self._sequences)
+        self._send(WriteBatch([message], 0, self._batcher.first, one.schema, one.metadata, self._bus))
+        self._note(one.log_time if self._now is None else self._now)
 
     def tick(self, now_ns: int) -> None:
         """Say what time it is on the capture's clock, at least every 0.25 s: closes, flushes and syncs what is due."""

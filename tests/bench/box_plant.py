@@ -22,7 +22,7 @@ from sniff.bus.live import LiveBus
 from sniff.bus.router import Router
 from sniff.capture import loop as capture_loop
 from sniff.capture.config import RecordSpec
-from sniff.capture.ipc import Batch, Derived, Ended, MessageSplitter, decode_message
+from sniff.capture.ipc import Batch, Ended, MessageSplitter, decode_message
 from sniff.capture.ipc_sender import IpcSender
 from sniff.capture.loop import CaptureLoop
 from sniff.capture.process import session_of
@@ -30,6 +30,7 @@ from sniff.cli import UNREADABLE, Failure
 from sniff.cli.targets import Target
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session, gone
+from sniff.recording.derived_message import DerivedMessage
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import SharedFile
 from sniff.recording.writer_thread import SYNC, Keeper
@@ -324,10 +325,8 @@ class SimLink:
     def trigger(self, bus: int, time: int, text: str) -> None:
         pass
 
-    def derived(self, *told: Any) -> bool:
-        one = Derived(*told)
-        recorder = self.loop.recorders[one.bus]
-        recorder.derived(one.topic, one.schema_name, one.log_time, one.publish_time, one.data, one.metadata)
+    def derived(self, bus: int, one: DerivedMessage) -> bool:
+        self.loop.recorders[bus].derived(one)
         return True
 
     def abandon(self, cut: bool) -> None:

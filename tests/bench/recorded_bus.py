@@ -15,6 +15,7 @@ from dissectors.profiles import Devices
 from sniff.bus.live import LiveBus
 from sniff.capture.ipc import Ended, Message, ReceivedMessage, Tick
 from sniff.engine.session import Adapter, Session
+from sniff.recording.derived_message import DerivedMessage
 from sniff.recording.writer import Recorder
 
 MS = 1_000_000
@@ -76,9 +77,9 @@ class Link:
     def let_go(self) -> None:
         return None
 
-    def derived(self, bus: int, topic: str, *arguments: object) -> bool:
-        if self.wanted(topic):
-            self.recorder.derived(topic, *arguments)  # type: ignore[arg-type]
+    def derived(self, bus: int, one: DerivedMessage) -> bool:
+        if self.wanted(one.topic):
+            self.recorder.derived(one)
         return True
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
 from dissectors.line import LineSettings
 from sniff.capture.ipc import Batch, Ended
 from sniff.engine.session import Session
+from sniff.recording.derived_message import DerivedMessage
 
 
 class GivenLink:
@@ -20,7 +20,7 @@ class GivenLink:
         self.over_since: float | None = None
         self.dropped: dict[int, int] = {}
         self.ended: Ended | None = None
-        self.told: list[tuple[Any, ...]] = []
+        self.told: list[DerivedMessage] = []
 
     def session(self, bus: int) -> Session:
         return Session(f"port{bus}", self.line, "modbus-rtu", bus=f"bus{bus}")
@@ -41,6 +41,6 @@ class GivenLink:
     def let_go(self) -> None:
         pass
 
-    def derived(self, *told: Any) -> bool:
-        self.told.append(told)
+    def derived(self, bus: int, derived: DerivedMessage) -> bool:
+        self.told.append(derived)
         return True

@@ -87,8 +87,8 @@ def test_what_was_heard_in_a_second_is_counted_in_it() -> None:
     bus, link = live(paths=("x.mcap",), watched=False)
     link.messages = [Tick(0, 1000 * MS), heard(polls(1010, 200)), Tick(0, 1900 * MS), Tick(0, 2000 * MS)]
     bus.poll_tables()
-    (told,) = [told for told in link.told if told[1] == "/bus/bus0"]
-    assert json.loads(told[5])["frames"] == 400
+    (told,) = [told for told in link.told if told.topic == "/bus/bus0"]
+    assert json.loads(told.data)["frames"] == 400
 
 
 def test_a_read_with_line_errors_keeps_its_place() -> None:

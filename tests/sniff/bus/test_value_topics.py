@@ -16,7 +16,8 @@ from dissectors.profiles.packaged import packaged
 from dissectors.readings import Origin, Reading
 from sniff.analysis.point_reader import Sample
 from sniff.bus import value_topics as value_channels
-from sniff.bus.value_topics import ValueChannels, ValueMessage
+from sniff.bus.value_topics import ValueChannels
+from sniff.recording.derived_message import DerivedMessage
 from sniff.recording.topics import SCHEMAS
 
 DEVICES = Devices({5: packaged("teco-f510")})
@@ -42,7 +43,7 @@ def holding(address: int, value: int) -> Reading:
     return Reading("holding", address, value, value, Origin.READ)
 
 
-def write(*given: Sample, bus: str = "boiler room") -> list[ValueMessage]:
+def write(*given: Sample, bus: str = "boiler room") -> list[DerivedMessage]:
     channels = ValueChannels(bus, DEVICES)
     return [message for sample in given if (message := channels.message(sample)) is not None]
 
@@ -51,7 +52,7 @@ def test_a_value_as_the_design_has_it() -> None:
     (message,) = write(*samples(holding(0x2524, 6000)))
     assert message.topic == "/values/boiler-room/5/output-frequency"
     assert json.loads(message.data) == {"value": 60.0, "raw": 6000, "quality": 0, "frame": 12}
-    assert (message.schema, message.time) == ("sniff485.Value", 7)
+    assert (message.schema, message.log_time) == ("sniff485.Value", 7)
     assert message.metadata["unit"] == "Hz"
     assert message.metadata["profile"] == "teco-f510"
 

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from dissectors.frame import Chunk, LineError, Mark
 from sniff.capture import ipc
 from sniff.capture.ipc import (
-    Derived,
     IpcError,
     IpcKind,
     MessageSplitter,
@@ -28,6 +27,7 @@ from sniff.capture.ipc import (
     one_by_one,
 )
 from sniff.engine.session import LineEvent, LineEventKind
+from sniff.recording.derived_message import DerivedMessage
 
 times = st.integers(-(2**63), 2**63 - 1)
 errors = st.integers(1, 15).map(LineError)
@@ -77,12 +77,11 @@ def test_the_other_messages() -> None:
     assert ended == ipc.Ended("stopped")
 
 
-@given(st.text(max_size=20), st.binary(max_size=50), st.one_of(st.none(), st.just({"unit": "°C"})))
+@given(st.text(max_size=20), st.binary(max_size=50), st.sampled_from([{}, {"unit": "°C"}]))
 def test_results_cross(topic, data, metadata) -> None:
-    derived = Derived(1, topic, "sniff485.Value", 5, 4, data, metadata)
-    ((kind, bus, body),) = MessageSplitter().feed(encode_derived(derived))
-    assert kind == IpcKind.DERIVED
-    assert decode_derived(bus, body) == derived
+    derived = DerivedMessage(topic, "sniff485.Value", 5, 4, data, metadata)
+    ((kind, bus, body),) = MessageSplitter().feed(encode_derived(1, derived))
+    assert (kind, bus, decode_derived(body)) == (IpcKind.DERIVED, 1, derived)
 
 
 @given(st.lists(st.tuples(st.integers(-(1 << 63), (1 << 63) - 1), st.binary(min_size=1, max_size=300)), min_size=1))
@@ -102,7 +101,7 @@ def test_reads_that_do_not_add_up_are_refused(body) -> None:
 
 @given(st.integers(0, 255), st.integers(0, 255), st.binary(max_size=60))
 def test_malformed_messages_are_refused_not_crashed_on(kind, bus, body) -> None:
-    for decode in (lambda: decode_message(kind, bus, body), lambda: decode_derived(bus, body)):
+    for decode in (lambda: decode_message(kind, bus, body), lambda: decode_derived(body)):
         with contextlib.suppress(IpcError):
             decode()
 

@@ -15,6 +15,7 @@ from sniff.capture.ipc import Ended, ReceivedMessage, Status, Tick
 from sniff.capture.link import CaptureLink
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import LineEvent, LineEventKind
+from sniff.recording.derived_message import DerivedMessage
 from sniff.sources import PortError
 from tests.e2e.recording_bus import octets_of
 
@@ -211,7 +212,7 @@ def test_where_no_socket_can_be_inherited(pty, tmp_path, monkeypatch, collect, o
     with CaptureLink.start([SourceSpec(pty.path, LINE)], RecordSpec(file)) as running:
         pty.feed(b"\x01\xff")
         collect(running, lambda got: octets(got) == b"\x01\xff")
-        assert running.derived(0, "/bus/bus", "sniff485.Bus", 1, 1, b"{}")
+        assert running.derived(0, DerivedMessage("/bus/bus", "sniff485.Bus", 1, 1, b"{}"))
 
 
 def test_nothing_in_the_current_folder_is_imported(pty, tmp_path, monkeypatch) -> None:
@@ -243,7 +244,7 @@ def test_results_find_their_way_into_the_file(pty, tmp_path) -> None:
 
     file = tmp_path / "night.mcap"
     link = CaptureLink.start([SourceSpec(pty.path, LINE)], RecordSpec(str(file)))
-    assert link.derived(0, "/bus/bus", "sniff485.Bus", 2_000, 1_000, b'{"load": 0.5}')
+    assert link.derived(0, DerivedMessage("/bus/bus", "sniff485.Bus", 2_000, 1_000, b'{"load": 0.5}'))
     link.stop()
     with file.open("rb") as stream:
         results = [
@@ -251,7 +252,7 @@ def test_results_find_their_way_into_the_file(pty, tmp_path) -> None:
             for _, channel, message in make_reader(stream).iter_messages(topics=["/bus/bus"])
         ]
     assert results == [("/bus/bus", 2_000, b'{"load": 0.5}')]
-    assert not link.derived(0, "/bus/bus", "sniff485.Bus", 2_000, 1_000, b"{}")
+    assert not link.derived(0, DerivedMessage("/bus/bus", "sniff485.Bus", 2_000, 1_000, b"{}"))
     assert link.derived_dropped == 1
 
 

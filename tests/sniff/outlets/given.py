@@ -10,10 +10,10 @@ from dissectors.findings import Finding, Severity
 from dissectors.profiles.decoding import Quality, Value
 from dissectors.readings import Origin, Reading
 from sniff.analysis.point_reader import Sample
-from sniff.bus.derived_topics import DerivedMessage
 from sniff.outlets.news import News, NewsKind
 from sniff.outlets.outlet import Outlet
 from sniff.outlets.told import FindingTold, NumbersTold, StateTold, Told, ToldBus, ValueTold
+from sniff.recording.derived_message import DerivedMessage
 
 NOW = 1_795_890_000_000_000_000
 BUS = ToldBus("boiler", "/dev/ttyUSB0", "modbus-rtu")

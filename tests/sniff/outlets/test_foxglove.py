@@ -15,6 +15,7 @@ import pytest
 from sniff.outlet_settings import ListenSettings, Secret, SettingsError, listen
 from sniff.outlets.foxglove import FoxgloveOutlet
 from sniff.outlets.told import LogTold
+from sniff.recording.derived_message import DerivedMessage
 from sniff.recording.topics import SCHEMAS
 from tests.sniff.outlets.given import BUS, NOW, numbers, value
 
@@ -28,8 +29,6 @@ SUBSCRIBED = 1
 
 @pytest.fixture(scope="module")
 def outlet() -> Iterator[FoxgloveOutlet]:
-    from sniff.bus.derived_topics import DerivedMessage
-
     made = FoxgloveOutlet(listen("0"), lambda text: None)
     made.start()
     found = DerivedMessage("/findings", "foxglove.Log", NOW, NOW, b'{"name": "MB001", "message": "no answer"}')

@@ -110,8 +110,8 @@ def test_that_nothing_is_heard_is_told_when_somebody_has_listened_for_a_while(no
     live = told([outlet], messages, now)
     assert live.now == 8000 * MS
     assert {one.news.finding.code for one in outlet.of(FindingTold)} - {"LN001"} == codes
-    assert {one[1] for one in live.link.told} >= {"/bus/bus0"}  # type: ignore[attr-defined]
-    assert {json.loads(one[5])["name"] for one in live.link.told if one[1] == "/findings"} - {"LN001"} == codes  # type: ignore[attr-defined]
+    assert {one.topic for one in live.link.told} >= {"/bus/bus0"}  # type: ignore[attr-defined]
+    assert {json.loads(one.data)["name"] for one in live.link.told if one.topic == "/findings"} - {"LN001"} == codes  # type: ignore[attr-defined]
 
 
 def test_what_goes_into_a_recording_is_the_same_with_a_listener() -> None:
@@ -125,7 +125,7 @@ def test_what_goes_into_a_recording_is_the_same_with_a_listener() -> None:
         if outlets:
             Teller(outlets).attach(live)
         to_the_end(live)
-        return [one for one in link.told if one[1].startswith("/values")]
+        return [one for one in link.told if one.topic.startswith("/values")]
 
     alone = recorded([])
     assert alone

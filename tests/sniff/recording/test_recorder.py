@@ -20,6 +20,7 @@ from sniff.engine.capture import CaptureError
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session
 from sniff.formats import read
 from sniff.recording import writer_thread
+from sniff.recording.derived_message import DerivedMessage
 from sniff.recording.reader import McapCapture
 from sniff.recording.rotation import Rotation, part_name
 from sniff.recording.topics import VALUE_SCHEMA
@@ -390,8 +391,10 @@ def test_results_of_the_engine_go_into_every_part(tmp_path: Path) -> None:
     for number in range(1500):
         recorder.chunk(Chunk(BASE + number * S, b"123"))
         data = b'{"value": %d}' % number
-        recorder.derived("/values/b/3/speed", VALUE_SCHEMA.name, BASE + number, BASE + number, data, {"unit": "Hz"})
-        recorder.derived("/odd", "no such schema", -5, 1 << 70, b"{}")
+        recorder.derived(
+            DerivedMessage("/values/b/3/speed", VALUE_SCHEMA.name, BASE + number, BASE + number, data, {"unit": "Hz"})
+        )
+        recorder.derived(DerivedMessage("/odd", "no such schema", -5, 1 << 70, b"{}"))
     recorder.close()
     assert recorder.trouble is None
     found = [one for path in recorder.paths for one in capture(path).messages("/values")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from dissectors.frame import Chunk
+from sniff.recording.derived_message import DerivedMessage
 from sniff.recording.writer import Recorder
 from sniff.recording.writer_thread import RELEASE_AFTER
 from tests.sniff.recording.test_recorder import BASE, SESSION, S, capture, eventually
@@ -18,7 +19,7 @@ def test_results_are_packed_together_and_octets_are_not_kept_back(tmp_path: Path
     for number in range(100):
         now += S // 10
         recorder.chunk(Chunk(now, b"1234"))
-        recorder.derived("/bus/b", "sniff485.Bus", now, now, b'{"load": 0.%03d}' % number)
+        recorder.derived(DerivedMessage("/bus/b", "sniff485.Bus", now, now, b'{"load": 0.%03d}' % number))
         recorder.tick(now)
     eventually(lambda: recorder._keeper.orders.empty(), "the thread is stuck")
     assert len(list(capture(recorder.path).items())) >= 90
@@ -39,7 +40,7 @@ def test_they_are_kept_back_by_the_clock_of_the_capture(tmp_path: Path) -> None:
     """However fast it runs: what is measured of a simulated bus holds for one that is listened to."""
     recorder = Recorder(tmp_path / "a.mcap", SESSION)
     for second in range(2 * RELEASE_AFTER // S + 10):
-        recorder.derived("/bus/b", "sniff485.Bus", BASE + second * S, BASE + second * S, b"{}")
+        recorder.derived(DerivedMessage("/bus/b", "sniff485.Bus", BASE + second * S, BASE + second * S, b"{}"))
         recorder.tick(BASE + second * S)
     eventually(lambda: recorder._keeper.orders.empty(), "the thread is stuck")
     there = len(list(capture(recorder.path).messages("/bus")))

@@ -13,6 +13,7 @@ from dissectors.line import LineSettings
 from sniff.engine.blocks import Block
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange
 from sniff.recording import scan
+from sniff.recording.derived_message import DerivedMessage
 from sniff.recording.reader import McapCapture
 from sniff.recording.rotation import Rotation
 from sniff.recording.topics import RAW, VALUE_SCHEMA, topics_of
@@ -163,7 +164,7 @@ def test_values_of_a_bus_stand_beside_its_reads(tmp_path: Path) -> None:
     recorders = SharedFile(tmp_path / "site.mcap", SESSIONS[:2]).recorders()
     record(recorders, given(7, 20, 2))
     for bus, recorder in enumerate(recorders):
-        recorder.derived(f"/values/{bus}/3/speed", VALUE_SCHEMA.name, BASE, BASE, b'{"value": 1}')
+        recorder.derived(DerivedMessage(f"/values/{bus}/3/speed", VALUE_SCHEMA.name, BASE, BASE, b'{"value": 1}'))
     close(recorders)
     topics = {topic for topic, _, _ in McapCapture(tmp_path / "site.mcap").messages("/values")}
     assert topics == {"/values/0/3/speed", "/values/1/3/speed"}

@@ -16,6 +16,7 @@ from dissectors.line import LineSettings
 from sniff.engine.session import LineEvent, LineEventKind, Session
 from sniff.formats import read
 from sniff.recording import writer_thread
+from sniff.recording.derived_message import DerivedMessage
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
 
@@ -146,7 +147,7 @@ def test_memory_lasts_for_five_minutes_of_a_full_bus(running: Running, gate: Gat
         recorder.chunk(given[-1])
         if number % 20 == 0:
             recorder.tick(running.now)
-            recorder.derived("/bus/b", "sniff485.Bus", running.now, running.now, b"{}" * 100)
+            recorder.derived(DerivedMessage("/bus/b", "sniff485.Bus", running.now, running.now, b"{}" * 100))
     assert recorder.lost_octets == 0
     gate.open.set()
     recorder.close()
@@ -217,7 +218,7 @@ def test_results_give_way_first(running: Running, gate: Gate, monkeypatch: pytes
     gate.open.clear()
     for _ in range(100):
         running.run(0.2)
-        recorder.derived("/bus/b", "sniff485.Bus", running.now, running.now, b"{}" * 100)
+        recorder.derived(DerivedMessage("/bus/b", "sniff485.Bus", running.now, running.now, b"{}" * 100))
     gate.open.set()
     recorder.close()
     assert recorder.lost_octets == 0
