@@ -6,11 +6,11 @@ import contextlib
 import selectors
 import subprocess
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from dissectors.line import LineSettings
+from sniff.capture.backlog import Backlog
 from sniff.capture.config import CaptureConfig, RecordSpec, SourceSpec
 from sniff.capture.ending import awaited_exit_code, exit_code, in_words
 from sniff.capture.ipc import (
@@ -26,11 +26,8 @@ from sniff.capture.ipc import (
     decode_message,
     encode,
     encode_derived,
-    encode_item,
     encode_json,
     encode_trigger,
-    gap_event,
-    octets_in,
     one_by_one,
 )
 from sniff.capture.spawn import Spawned, spawn
@@ -52,11 +49,6 @@ GIVEN_AT_ONCE = 128 * 1024
 
 READ_AT_ONCE = 4 * 1024 * 1024
 """Octets read before that: all there is in good times, so that the end of the capture is seen when it comes."""
-
-MOST_WAITING = 8 * 1024 * 1024
-MESSAGE_COST = 100
-"""Octets of messages kept for a caller that is behind, with what each takes beside its body; reads beyond that are
-dropped and counted."""
 
 GOODBYE = 1.0
 """Seconds for a process that has said its last words, and once more when it was killed: a sync may hold it."""
@@ -80,9 +72,8 @@ class CaptureLink:
 
     One thread at a time may use it. `pid`: of the capture process. `priority`: what it was granted. `clock`: its
     clock. `paths`: the files that it records to at first. `derived_dropped`: results that did not go back in time.
-    `dropped`: octets of each bus that came here and were not given out, because the caller did not keep up. `closing`:
-    whether the end of the capture has come here, although other things may wait before it. `over_since`: when that
-    was, or when it was asked to end, s of the monotonic clock; None before.
+    `closing`: whether the end of the capture has come here, although other things may wait before it. `over_since`:
+    when that was, or when it was asked to end, s of the monotonic clock; None before.
     """
 
     def __init__(self, spawned: Spawned) -> None:
@@ -92,9 +83,7 @@ class CaptureLink:
         self._connection = spawned.connection
         self._sending = True
         self._splitter = MessageSplitter()
-        self._waiting: deque[tuple[int, int, bytes]] = deque()
-        self._waiting_size = 0
-        self._gap: dict[int, int] = {}  # bus → octets dropped since the last read that was kept
+        self._waiting = Backlog()
         self._heard_at = time.monotonic()
         self._stops = 0
         self._reported: dict[int, Status] = {}  # the newest of each bus
@@ -109,7 +98,6 @@ class CaptureLink:
         self.paths: list[str] = []
         self.clock = Clock(0, 0)
         self.derived_dropped = 0
-        self.dropped: dict[int, int] = {}
         self.ended: Ended | None = None
 
     # -- starting ----------------------------------------------------------------------------------------------
@@ -160,7 +148,7 @@ class CaptureLink:
                 if given_up:
                     raise KeyboardInterrupt
                 raise PortError(self._why_dead())
-        kind, _, body = self._pop()
+        kind, _, body = self._waiting.take()
         value = decode_json(body)
         if kind == IpcKind.FAILED:
             raise (PortError if value.get("kind") == "port" else CaptureError)(str(value.get("text")))
@@ -195,8 +183,9 @@ class CaptureLink:
         try:
             given = 0
             while self._waiting and given < GIVEN_AT_ONCE:
-                given += len(self._waiting[0][2])
-                message = decode_message(*self._pop())
+                kind, bus, body = self._waiting.take()
+                given += len(body)
+                message = decode_message(kind, bus, body)
                 if message is not None:
                     messages.append(message)
                 if isinstance(message, Status):
@@ -274,35 +263,15 @@ class CaptureLink:
                 return False
             taken += len(data)
             for kind, bus, body in self._splitter.feed(data):
-                self._keep(kind, bus, body)
+                self._waiting.add(kind, bus, body)
+                if kind == IpcKind.ENDED:
+                    self._close()
         return True
 
-    def _keep(self, kind: int, bus: int, body: bytes) -> None:
-        """Have a message wait for the caller; reads are dropped when too much waits already."""
-        if kind in (IpcKind.CHUNK, IpcKind.READS):
-            gap = self._gap.get(bus, 0)
-            if self._waiting_size > (MOST_WAITING // 2 if gap else MOST_WAITING):
-                octets = octets_in(kind, body)[1]
-                self._gap[bus] = gap + octets
-                self.dropped[bus] = self.dropped.get(bus, 0) + octets
-                return
-            if gap:
-                self._gap[bus] = 0
-                event = gap_event(octets_in(kind, body)[0], gap)
-                for message in MessageSplitter().feed(encode_item(bus, event)):
-                    self._add(*message)
-        elif kind == IpcKind.ENDED:
-            self._close()
-        self._add(kind, bus, body)
-
-    def _add(self, kind: int, bus: int, body: bytes) -> None:
-        self._waiting.append((kind, bus, body))
-        self._waiting_size += len(body) + MESSAGE_COST
-
-    def _pop(self) -> tuple[int, int, bytes]:
-        message = self._waiting.popleft()
-        self._waiting_size -= len(message[2]) + MESSAGE_COST
-        return message
+    @property
+    def dropped(self) -> dict[int, int]:
+        """Octets of each bus that came here and were not given out, because the caller did not keep up."""
+        return self._waiting.dropped
 
     # -- sending -----------------------------------------------------------------------------------------------
 

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from dissectors.frame import Chunk
-from sniff.capture import link as link_module
+from sniff.capture import backlog
 from sniff.capture.ipc import LOSSY, Ended, ReceivedMessage, encode_ended, encode_item
 from sniff.capture.link import CaptureLink
 from sniff.capture.spawn import Spawned
@@ -44,7 +44,7 @@ def chunks(number: int, count: int) -> bytes:
 
 
 def test_it_keeps_so_much_and_says_what_is_missing(ends, monkeypatch) -> None:
-    monkeypatch.setattr(link_module, "MOST_WAITING", 20_000)
+    monkeypatch.setattr(backlog, "MOST_WAITING", 20_000)
     for number in range(10):
         ends.theirs.sendall(chunks(number * 50, 50))
         assert ends.link.look()
