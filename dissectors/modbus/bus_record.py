@@ -14,6 +14,7 @@ from dissectors.late_speakers import LateSpeakers
 from dissectors.line import MS, Timing
 from dissectors.modbus.poll_order import Neighbours
 from dissectors.modbus.station_record import Cycles, StationRecord
+from dissectors.modbus.text_changes import TextDamage
 from dissectors.rhythm import Rhythm
 from dissectors.strikes import Strikes
 from dissectors.wrong_checks import Habit, WrongChecks
@@ -81,7 +82,8 @@ class BusRecord:
     the first the first ones, (time, frame before, frame), `close_ever`: all. `odd_ends`: ASCII frames that do not end
     with CR LF, by how they end and by sender.
     `held_back`: of the paused frames, those that an adapter may have made so that nobody named.
-    `damaged_here`: damaged requests that were answered all the same.
+    `damaged_here`: damaged requests that were answered all the same. `text_damage`: of damaged requests, and of what
+    came unasked and may be one.
     `again`: requests that were answered when they came a second time.
     `crossed`: answers to the request before the newest, which came sooner than a turn takes; by what may follow what.
     `asked_twice`: second answers to requests that were heard twice, one directly behind the other.
@@ -105,6 +107,7 @@ class BusRecord:
     stations: dict[int, StationRecord] = field(default_factory=dict)
     damaged_here: Tally = field(default_factory=Tally)
     damaged_requests: Tally = field(default_factory=Tally)
+    text_damage: TextDamage = field(default_factory=TextDamage)
     strikes: Strikes = field(default_factory=Strikes)  # "master", "station 3" …
     late_speakers: LateSpeakers = field(default_factory=LateSpeakers)
     unasked: Tally = field(default_factory=Tally)

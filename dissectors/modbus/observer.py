@@ -23,6 +23,7 @@ from dissectors.modbus.row_observer import AT_ONCE, STRAY_KEPT
 from dissectors.modbus.rules_bus import judge
 from dissectors.modbus.second_answers import SecondAnswer, owed
 from dissectors.modbus.station_record import StationRecord
+from dissectors.modbus.text_changes import request_length, sent_length
 from dissectors.modbus.wrong_ends import ends_badly, excess_of
 from dissectors.tracker import Transaction, Verdict
 
@@ -173,10 +174,16 @@ class ModbusFindings(RequestObserver):
         self.seen.late_speakers.damaged_request(octets, transaction.start, transaction.request)
         self.seen.damaged_requests.add(transaction.start, transaction.request)
         if asked is not None:
+            self._keep_damaged(asked.frame)
             self.seen.checks_of_requests.see(asked.no, asked.frame.end, ways(asked.frame))
         if heard.flaw is not None:
             tallies = self.seen.requests_damaged_by
             tallies.setdefault(heard.flaw, Tally()).add(transaction.start, transaction.request)
+
+    def _keep_damaged(self, frame: Frame) -> None:
+        """A damaged frame that is a request, or may be one."""
+        if frame.protocol == RTU_NAME:
+            self.seen.text_damage.add(frame.octets, request_length(frame.octets))
 
     def _see_end(self, heard: Heard, unit: int, no: int, frame: Frame) -> None:
         """How a damaged answer of a station, in that row, ended."""
@@ -208,6 +215,8 @@ class ModbusFindings(RequestObserver):
             return  # the capture began between a request and its answer
         if transaction.id in self.damaged:  # more likely a request, when nobody was asked
             octets = ended[2].octets if ended is not None else b""
+            if ended is not None:
+                self._keep_damaged(ended[2])
             self.seen.late_speakers.damaged_request(octets, transaction.start, transaction.response)
             if self.seen.late_speakers.shows(octets, transaction.start):
                 return
@@ -274,6 +283,8 @@ class ModbusFindings(RequestObserver):
     ) -> None:
         """Something came in place of an answer: in what way it is wrong."""
         stray = heard.stray
+        if stray and asked.frame.protocol == RTU_NAME:
+            station.text_damage.add(stray, sent_length(asked.frame.octets, stray))
         if heard.flaw is not None:
             station.flaw(heard.flaw).add(transaction.end, transaction.request, transaction.response)
             return

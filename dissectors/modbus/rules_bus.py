@@ -18,6 +18,7 @@ from dissectors.modbus.rules import RULES
 from dissectors.modbus.rules_late import of_impatience, of_late_speakers, under_late_answers
 from dissectors.modbus.rules_of_answers import RELAYED
 from dissectors.modbus.rules_station import FLAWS, SPOILT, is_absent, of_missing, of_station, wrongly_checked
+from dissectors.modbus.rules_text import of_text_changes
 from dissectors.modbus.rules_unheard import of_unheard, under_what_is_missed
 from dissectors.modbus.struck_octet import falls_there_by_chance
 from dissectors.words import duration, fine_milliseconds, percent
@@ -42,6 +43,7 @@ def judge(seen: BusRecord, timeout: int | None) -> tuple[Finding, ...]:
         *_of_masters(seen),
         *_of_gaps(seen),
         *_of_ends(seen),
+        *of_text_changes(seen),
         *_common_damage(seen, damage),
         *of_late_speakers(seen),
         *of_impatience(seen, timeout),

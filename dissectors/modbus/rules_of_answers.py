@@ -279,5 +279,22 @@ ANSWER_RULES = (
         "this tap's place, its ground and its wires to the line; whether the master's reads fail at all",
         explains=("MB207", "LN101"),
     ),
+    Rule(
+        "MB023",
+        Severity.WARNING,
+        "octets taken for text",
+        "Damaged frames of which at least three, and 3 in 4 of the newest ones that tell it, are good once one thing "
+        "is undone that ports and programs do to text: CR (0D) read as LF (0A), or LF as CR; CR put before LF; CR, LF "
+        "or FF left out; XON and XOFF (11, 13) left out; FF sent twice. By chance once in 16 million. Of the bus where "
+        "it befalls several, or all there are.",
+        "the port or the program that this was read with takes octets for text: a terminal's line discipline, text "
+        "mode, software flow control, Telnet, a gateway that translates line ends; the line may be well",
+        "read the port raw (binary), without XON/XOFF and line-end translation; does the master have the same trouble",
+        explains=(
+            *("MB001", "MB006", "MB009", "MB010", "MB012", "MB015", "MB022", "MB106", "MB207", "MB208"),
+            *("LN003", "LN201", "LN202", "LN203", "LN204"),
+            *_OF_DAMAGE,
+        ),
+    ),
 )
 """In the order of their codes."""

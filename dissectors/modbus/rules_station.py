@@ -55,13 +55,8 @@ def of_station(
     seen: BusRecord, unit: int, station: StationRecord, timeout: int | None, is_common: bool
 ) -> Iterator[Finding]:
     name = f"station {unit}"
-    foreign = foreign_answers(seen, name, station)
-    miscounted = None if foreign else _miscounted(name, station)
-    systematic = [*_flawed(seen, name, station), *(one for one in (foreign, miscounted) if one)]
-    yield from systematic
-    explained = sum(finding.count for finding in systematic)
-    if 4 * explained < 3 * station.damaged.count:
-        yield from _damaged(seen, unit, station, is_common)
+    if station.text_damage.change is None:  # else see `of_text_changes`
+        yield from _damage(seen, unit, name, station, is_common)
     yield from _exceptions(seen, name, unit, station)
     if station.unfit.count:
         why, _ = station.unfit_words.most_common(1)[0] if station.unfit_words else ("", 0)
@@ -79,6 +74,16 @@ def of_station(
         yield station.reserved.found(
             RULES["MB205"], name, f"{counted(station.reserved.count, 'frame')} from or to this address"
         )
+
+
+def _damage(seen: BusRecord, unit: int, name: str, station: StationRecord, is_common: bool) -> Iterator[Finding]:
+    """What came in place of its answers: what it does each time, and, where that is not nearly all, what damages it."""
+    foreign = foreign_answers(seen, name, station)
+    miscounted = None if foreign else _miscounted(name, station)
+    systematic = [*_flawed(seen, name, station), *(one for one in (foreign, miscounted) if one)]
+    yield from systematic
+    if 4 * sum(finding.count for finding in systematic) < 3 * station.damaged.count:
+        yield from _damaged(seen, unit, station, is_common)
 
 
 def of_missing(seen: BusRecord, unit: int, station: StationRecord, is_scanned: bool) -> Iterator[Finding]:

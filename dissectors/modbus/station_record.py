@@ -13,6 +13,7 @@ from dissectors.modbus.garbage import Garbage
 from dissectors.modbus.pairing import is_answer
 from dissectors.modbus.poll_order import Asked, Neighbours, PollOrder
 from dissectors.modbus.response_groups import AnsweredRequest, SameRequest
+from dissectors.modbus.text_changes import TextDamage
 from dissectors.tracker import Interval
 from dissectors.wrong_checks import Habit, WrongChecks
 
@@ -182,6 +183,7 @@ class StationRecord:
     excess: list[int] = field(default_factory=list)  # octets by which those were too long
     garbled: int = 0  # octets in place of an answer that are no frame at all
     garbage: Garbage = field(default_factory=Garbage)  # what came in place of an answer, whole
+    text_damage: TextDamage = field(default_factory=TextDamage)  # of the damaged answers of RTU
     flaws: dict[Flaw, Tally] = field(default_factory=dict)  # damaged answers that one change makes good
     undecided: Tally = field(default_factory=Tally)  # a frame that is the answer or the request again
     echoed: int = 0  # requests that were given back at once
@@ -209,6 +211,8 @@ class StationRecord:
     @property
     def explained(self) -> int:
         """How many damaged answers are no damage of the line: always the same, or always in the same way."""
+        if self.text_damage.change is not None:
+            return self.damaged.count
         flawed = sum(tally.count for tally in self.flaws.values() if tally.count >= 3)
         miscounted = self.miscounted
         flawed += miscounted.count if miscounted is not None else 0

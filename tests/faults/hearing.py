@@ -182,6 +182,12 @@ def noisy_tap(party: str, share: float, plan: Scenario, seconds: float, tap: Tap
     return session, items()
 
 
+def as_text(change: Callable[[bytes], bytes], plan: Scenario, seconds: float, tap: TapModel) -> Heard:
+    """A port whose driver, or a program whose reads, make something else of octets that mean something in text."""
+    session, items = simulate(plan, seconds, tap)
+    return session, (replace(one, octets=change(one.octets)) if isinstance(one, Chunk) else one for one in items)
+
+
 def losing(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
     """A computer that loses a read now and then, and says so."""
     session, items = simulate(plan, seconds, tap)

@@ -13,7 +13,8 @@ from dissectors.simulated_faults import BitFlips, Break, CutShort, LateResponse,
 from sniff.simulation.tap import CH340, FTDI, UART
 from tests.faults.buses import RTU_LINE, modbus
 from tests.faults.case import Case, Said
-from tests.faults.hearing import echoing, hidden_latency, noisy_tap, of_party, sent_otherwise, unheard
+from tests.faults.check_cases import Sends
+from tests.faults.hearing import as_text, echoing, hidden_latency, noisy_tap, of_party, sent_otherwise, unheard
 from tests.faults.misbehaving import (
     ByTheClock,
     Rewrites,
@@ -30,6 +31,7 @@ from tests.faults.misbehaving import (
     swapped_check,
 )
 from tests.faults.stations import AnswersBroadcasts, Dies, Ignores, Of
+from tests.faults.well_behaved import counting_server
 from tests.faults.workbench import Modbus, server, usual_requests, usual_stations
 
 MS = 1_000_000
@@ -86,6 +88,24 @@ _by_the_clock = replace(
     stations=usual_stations(_FOUR, unit_4=30 * MS),
     master=partial(ByTheClock, tick=90 * MS),
 )
+
+
+def _counting(first: int) -> Modbus:
+    """Three meters whose counters begin there."""
+    units = (1, 2, 3)
+    return Modbus(
+        tuple(read_holding(unit, 0, 2) for unit in units),
+        {unit: partial(counting_server, unit, 8 * MS, first) for unit in units},
+    )
+
+
+def _cr_as_lf(octets: bytes) -> bytes:
+    return octets.replace(b"\r", b"\n")
+
+
+def _without_flow(octets: bytes) -> bytes:
+    return octets.replace(b"\x11", b"").replace(b"\x13", b"")
+
 
 MODBUS_CASES: tuple[Case, ...] = (
     # damage that is the same each time
@@ -196,6 +216,24 @@ MODBUS_CASES: tuple[Case, ...] = (
         "RTU check of one station computed otherwise",
         partial(modbus, change={2: partial(Rewrites, rewrite=other_check)}),
         (("MB021", "station 2"),),
+        seeds=1,
+    ),
+    # octets that something takes for text
+    Case(
+        "RTU read as text",
+        _counting(0x0CF0),
+        (("MB023", "bus"),),
+        hear=partial(as_text, _cr_as_lf),
+        never=("MB005", "MB007"),
+        seconds=20,
+        seeds=1,
+    ),
+    Case(
+        "RTU flow control before one station",
+        replace(_counting(0x10F0), change={2: partial(Sends, made=_without_flow)}),
+        (("MB023", "station 2"),),
+        never=("MB005", "MB006"),
+        seconds=20,
         seeds=1,
     ),
     # what this tap alone does not hear
