@@ -21,6 +21,8 @@ from dissectors.bacnet.findings_of_use import polls, use
 from dissectors.bacnet.findings_of_waiting import impatient, waiting
 from dissectors.bacnet.limits import MAX_MASTER, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.long_answers import LongAnswers
+from dissectors.bacnet.misfitting_answers import OtherNumbers
+from dissectors.bacnet.misfitting_answers import astray as answers_astray
 from dissectors.bacnet.ring import COARSE_LIMIT, Ring, RingNode
 from dissectors.bacnet.ring_events import Happened, RingEventKind
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
@@ -53,6 +55,7 @@ often than after other tokens."""
 POSTPONED_SHARE = 0.1
 LEAST_USES = 20
 FOR_OTHERS_LEAST = 3
+_OF_NO_REQUEST = frozenset((Verdict.UNSOLICITED, Verdict.ANSWERED_TWICE))
 _ANSWERED = frozenset((Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION))
 
 _SIMPLE: tuple[tuple[str, RingEventKind, int, str], ...] = (
@@ -85,6 +88,7 @@ def judge(ring: Ring) -> tuple[Finding, ...]:
         *astray(ring),
         *_answers(ring),
         *_for_others(ring),
+        *answers_astray(ring),
         *waiting(impatient(ring)),
         *late,
         *hearing(ring),
@@ -257,7 +261,7 @@ class MstpFindings:
         self._observer = BulkRingObserver(timing)
         self._content = ContentFindings()
         self._instances, self._routers, self._lengths = DeviceInstances(), RouterFindings(), LongAnswers()
-        self._refusals, self._promises = Refusals(), BrokenPromises()
+        self._refusals, self._promises, self._numbers = Refusals(), BrokenPromises(), OtherNumbers()
         self._newest: tuple[tuple[int, Event | None], ...] = ()  # the newest two rows, their numbers before them
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None = None) -> None:
@@ -274,6 +278,9 @@ class MstpFindings:
         station, verdict = transaction.station, transaction.verdict
         if station is not None and transaction.error == Ending.NEVER_ANSWERED:
             self._promises.add(station, transaction)
+        if verdict in _OF_NO_REQUEST and len(self._newest) == 2 and transaction.response == self._newest[1][0]:
+            (_, before), (_, answer) = self._newest
+            self._numbers.add(transaction, before, answer)
         if station is None or transaction.is_passing or verdict not in _ANSWERED:
             return
         self._refusals.answer(station, transaction.kind)
@@ -309,6 +316,7 @@ class MstpFindings:
         if Ending.NEVER_ANSWERED in closed.names:
             for place in np.flatnonzero(closed.error == closed.names.index(Ending.NEVER_ANSWERED)).tolist():
                 self._promises.add(int(closed.station[place]), rows.transaction(place))
+        self._settle_unasked(rows)
         full = len(self._refusals.asked) + len(kinds) > REFUSED_KEPT
         before = self._newest[-1:]
         for place in np.flatnonzero(told if full else told & refused).tolist():
@@ -321,6 +329,20 @@ class MstpFindings:
                 self._refusals.asked[station, closed.names[kind]] += count
         if len(rows):
             self._newest = ((rows.first + len(rows) - 1, rows.row(len(rows) - 1).event),)
+
+    def _settle_unasked(self, rows: RowColumns) -> None:
+        """Answers to nothing that is open, each closed by its own row."""
+        import numpy as np
+
+        from dissectors.columns import VERDICTS
+
+        unasked = np.isin(rows.transactions.verdict, [VERDICTS.index(verdict) for verdict in _OF_NO_REQUEST])
+        for place in np.flatnonzero(unasked).tolist():
+            transaction, at = rows.transaction(place), int(rows.closed_by[place])
+            if at < 0 or transaction.response != rows.first + at:
+                continue
+            before = rows.row(at - 1).event if at else self._newest[-1][1] if self._newest else None
+            self._numbers.add(transaction, before, rows.row(at).event)
 
     def ring(self) -> Ring:
         """The ring so far."""
@@ -335,5 +357,6 @@ class MstpFindings:
         ring = self._observer.ring()
         others = (*self._refusals.findings(), *self._content.findings(), *self._instances.findings(ring.nodes))
         others += (*self._routers.findings(), *self._promises.findings(ring), *self._lengths.findings())
+        others += tuple(self._numbers.findings(ring))
         made = (*judge(ring), *others)
         return tuple(sorted(made, key=_gravest_first))

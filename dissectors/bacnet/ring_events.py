@@ -27,6 +27,7 @@ class RingEventKind(Enum):
     DAMAGED_REPLY = "damaged octets in place of an answer"
     TOO_SOON = "sent again before its own poll could be answered"
     FOR_ANOTHER = "answered what another station was asked"
+    ASTRAY = "answered to another address than the one that asked"
     UNASKED = "sent without being asked, and never has the token"
     LATE_USE = "late to use the token"
     LATE_ASKING = "late to use the token, and asked with it"

@@ -6,6 +6,7 @@ from collections import OrderedDict, deque
 from dataclasses import dataclass
 
 from dissectors.bacnet import message as messages
+from dissectors.bacnet.foreign_answers import is_astray
 from dissectors.bacnet.frame_types import CARRIES_NPDU, EXPECTING, PROPRIETARY, FrameType
 from dissectors.bacnet.held_reads import HeldReads, surely_over
 from dissectors.bacnet.limits import MAX_MASTER, MS, T_NO_TOKEN, T_REPLY_DELAY, T_USAGE_DELAY, T_USAGE_TIMEOUT
@@ -183,6 +184,9 @@ class RingQuestions:
             if to_itself and data_of(frame.octets) != data_of(asked.frame.octets):
                 self._tally.note(RingEventKind.OTHER_ECHO, frame.start, no, source)
             return answered
+        if frame_type in CARRIES_NPDU and not self.doubt and is_astray(frame, asked.frame):
+            self._tally.note(RingEventKind.ASTRAY, frame.start, no, source, destination)
+            return True
         if not back or frame_type in _NO_ANSWERS:
             self._unanswered_request(asked, frame)
             return False

@@ -178,6 +178,25 @@ def test_a_token_that_was_not_heard_is_over_when_the_next_one_is() -> None:
     same(by_tables(items, judged(session), random.Random(1), 1 << 30), expected)
 
 
+def test_answers_that_nobody_can_take_are_found_in_tables_as_row_by_row() -> None:
+    """The request may be the last row of the table before its answer's."""
+    steps = rounds(9, 2, 5, 9)
+    for no in range(8):
+        asked, acked = (
+            bytes.fromhex(f"010402750{no}0c0c000000041955"),
+            bytes.fromhex(f"010020{no % 2 * no:02x}0c"),
+        )
+        steps += [(2, npdu_frame(9, 2, asked, True)), (9, npdu_frame(255 if no % 2 else 2, 9, acked, False))]
+        steps += rounds(4, 2, 5, 9)
+    session = Session("x", bulk_mstp.LINE, "mstp")
+    items = list(tables([Block(reads_of(chunks_of(steps)))], session))
+    expected = by_rows(items, judged(session))
+    assert {"MS312", "MS313"} <= {one.code for one in expected.findings()}
+    dice = random.Random(2)
+    for most in (1 << 30, 1, 3, 20):
+        same(by_tables(items, judged(session), dice, most), expected)
+
+
 def test_who_answered_in_a_run_is_known_to_answer() -> None:
     """Who asked it goes on 200 ms later, sooner than it may give up: it had the answer, which was not heard."""
     asked, acked = bytes.fromhex("01040275000c0c000000041955"), bytes.fromhex("010020000c")

@@ -332,6 +332,26 @@ def two_ways_to_one_network() -> list[Step]:
     return [*once, (2, token(6, 20)), (2, token(20, 4))] * 3 + rounds(3, 4, 6, 20)
 
 
+def answers_elsewhere() -> list[Step]:
+    """12 sends its answers to everybody; 3 takes that for another token and lets go of its own, as it must."""
+    steps: list[Step] = []
+    for at in range(4):
+        ask, value = (f"{octets[:at_id]}{at + 1:02x}{octets[at_id + 2 :]}" for octets, at_id in ((READ, 8), (VALUE, 6)))
+        steps += [*rounds(3, 3, 12, 19), (2, data(3, 12, ask, expects=True)), (6, data(12, 255, value))]
+        steps += [(510, poll(3, 11)), (24, poll(3, 12)), (3, found(12, 3)), *rounds(1, 3, 12, 19)]
+    return steps + rounds(3, 3, 12, 19)
+
+
+def answers_with_another_number() -> list[Step]:
+    """12 answers whatever it is asked with invoke id 0."""
+    value = f"{VALUE[:6]}00{VALUE[8:]}"
+    steps: list[Step] = []
+    for at in range(4):
+        ask = f"{READ[:8]}{at + 20:02x}{READ[10:]}"
+        steps += [*rounds(3, 3, 12, 19), (2, data(3, 12, ask, expects=True)), (6, data(12, 3, value))]
+    return steps + rounds(3, 3, 12, 19)
+
+
 def token_to_itself() -> list[Step]:
     """3 believes to be alone, and passes the token to itself; the adapter hides how soon."""
     return [(4 + at % 3 * 9, token(3, 3)) for at in range(60)]
@@ -373,6 +393,8 @@ MADE = {
     "ms-tp-polls-beyond-its-successor": polls_astray,
     "ms-tp-two-routers-to-one-network": two_ways_to_one_network,
     "ms-tp-token-to-itself-behind-an-adapter": token_to_itself,
+    "ms-tp-answers-to-another-address": answers_elsewhere,
+    "ms-tp-answers-with-another-number": answers_with_another_number,
 }
 
 
