@@ -16,7 +16,7 @@ from dissectors.bacnet.findings_of_overdue import overdue, under_late_answers
 from dissectors.bacnet.findings_of_refusals import REFUSED_KEPT, Refusals
 from dissectors.bacnet.findings_of_routers import RouterFindings
 from dissectors.bacnet.findings_of_skipping import skipped
-from dissectors.bacnet.findings_of_tokens import silences, tokens
+from dissectors.bacnet.findings_of_tokens import silences, takes_none, tokens
 from dissectors.bacnet.findings_of_use import polls, use
 from dissectors.bacnet.findings_of_waiting import impatient, waiting
 from dissectors.bacnet.limits import MAX_MASTER, T_REPLY_DELAY, T_USAGE_DELAY
@@ -157,6 +157,8 @@ def _counted(ring: Ring) -> Iterable[Remark]:
             if what is kind and happened.count >= least:
                 if kind is RingEventKind.RETRY and takes_unheard(ring, mac):
                     continue
+                if kind is RingEventKind.REJOINED and takes_none(ring, mac):
+                    continue  # it was never in the ring
                 severity = None
                 node = ring.nodes.get(mac) if mac is not None else None
                 if code == "MS102" and (happened.count == 1 or _share(happened.count, node) < least_share):

@@ -15,6 +15,8 @@ from dissectors.findings import Finding, Severity, counted, times
 STRAYS_SHARE = 0.2
 """Of a second token is spoken where it shows itself so many times for each frame that the tap did not hear."""
 
+TAKES_NONE_LEAST = 2
+
 ALONE_POLLS = 2 * MAX_MASTER
 """A first search for a successor takes at most MAX_MASTER polls."""
 
@@ -30,6 +32,8 @@ def tokens(ring: Ring) -> Iterable[Remark]:
             and ring.of(RingEventKind.REJOINED, mac).last <= happened.last
         ):
             node = ring.nodes.get(mac)
+            if takes_none(ring, mac):
+                continue
             gone = node is not None and node.last_token <= happened.last
             if node is None or not gone or _comes_back(ring, mac, happened.last):
                 continue
@@ -47,9 +51,33 @@ def tokens(ring: Ring) -> Iterable[Remark]:
         who = sorted({mac for mac, _ in strays if mac is not None})
         seen = f"MAC {listed(who)} sent {times(together.count)} while another one had the token"
         yield Remark(who[0] if len(who) == 1 else None, of("MS104", None, seen, together).finding)
+    for mac in ring.nodes:
+        if takes_none(ring, mac):
+            yield _takes_none(ring, mac)
     for mac, node in ring.nodes.items():
         if node.polls_sent > ALONE_POLLS and not node.tokens_sent and not node.tokens_received:
             yield _alone(ring, mac, node.polls_sent)
+
+
+def takes_none(ring: Ring, mac: int | None) -> bool:
+    """Whether a station answers polls, and has used none of the tokens that it was given up for."""
+    node = ring.nodes.get(mac) if mac is not None else None
+    if (
+        node is None
+        or node.poll_replies_sent < TAKES_NONE_LEAST
+        or ring.of(RingEventKind.LEFT, mac).count < TAKES_NONE_LEAST
+    ):
+        return False
+    return not (node.tokens_sent or node.polls_sent or node.requests_sent or node.use.count)
+
+
+def _takes_none(ring: Ring, mac: int) -> Remark:
+    left, node = ring.of(RingEventKind.LEFT, mac), ring.nodes[mac]
+    seen = (
+        f"answered {counted(node.poll_replies_sent, 'poll')} for masters, and never used the token that it got for it: "
+        f"it was given up {times(left.count)}"
+    )
+    return of("MS113", mac, seen, left)
 
 
 def _passes_on(ring: Ring, mac: int, since: int) -> bool:

@@ -128,6 +128,19 @@ _ALL = (
         explains=("MS110",),
     ),
     Rule(
+        "MS113",
+        Severity.WARNING,
+        "never uses its token",
+        "A station answers polls for masters, and has not used one token that it was passed for that: twice and "
+        "more it was repeated, and then the station given up. Each time costs the bus two waits for it, and the search "
+        "for another one.",
+        "it does not hear the token, which comes directly behind its answer: its driver is switched off too late after "
+        "it has sent, or its program is not ready again",
+        "the turnaround of that station: its driver must be off 15 bit times after the last octet (Tpostdrive; ASHRAE "
+        "135, 9.5.3); its firmware; or make it a slave",
+        explains=("MS102", "MS105", "MS106"),
+    ),
+    Rule(
         "MS111",
         Severity.WARNING,
         "sent without being asked",

@@ -352,6 +352,15 @@ def answers_with_another_number() -> list[Step]:
     return steps + rounds(3, 3, 12, 19)
 
 
+def never_uses_it() -> list[Step]:
+    """40 answers the polls of 19 and is silent when it gets the token."""
+    steps: list[Step] = []
+    for _ in range(4):
+        steps += [*rounds(20, 3, 12, 19), (2, token(3, 12)), (2, token(12, 19)), (2, poll(19, 40)), (3, found(40, 19))]
+        steps += [(2, token(19, 40)), (24, token(19, 40)), (24, poll(19, 41)), (24, poll(19, 42)), (24, token(19, 3))]
+    return steps + rounds(20, 3, 12, 19)
+
+
 def token_to_itself() -> list[Step]:
     """3 believes to be alone, and passes the token to itself; the adapter hides how soon."""
     return [(4 + at % 3 * 9, token(3, 3)) for at in range(60)]
@@ -395,6 +404,7 @@ MADE = {
     "ms-tp-token-to-itself-behind-an-adapter": token_to_itself,
     "ms-tp-answers-to-another-address": answers_elsewhere,
     "ms-tp-answers-with-another-number": answers_with_another_number,
+    "ms-tp-never-uses-its-token": never_uses_it,
 }
 
 
