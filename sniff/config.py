@@ -159,10 +159,17 @@ def candidates(start: Path) -> list[Path]:
 
 def load(start: Path | None = None) -> Config:
     """The first configuration found, or an empty one. Raises ConfigError."""
-    for path in candidates((start or Path.cwd()).resolve()):
+    for path in candidates((start or _here()).resolve()):
         if path.is_file():
             return parse(path)
     return Config(None, {})
+
+
+def _here() -> Path:
+    try:
+        return Path.cwd()
+    except FileNotFoundError:
+        raise ConfigError("the current folder is not there any more: go to one that is") from None
 
 
 def parse(path: Path) -> Config:
@@ -198,7 +205,7 @@ def save_view(name: str, view: View, start: Path | None = None) -> Path:
     held = load(start)
     if name in held.views:
         raise ConfigError(f"{held.path}: [view.{name}] is there already")
-    path = held.path or candidates((start or Path.cwd()).resolve())[-1]
+    path = held.path or candidates((start or _here()).resolve())[-1]
     path.parent.mkdir(parents=True, exist_ok=True)
     lines = [f"[view.{name}]"]
     lines += [f"{which} = {json.dumps(list(words))}" for which, words in view.columns.items()]

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from sniff.box.page import HAS_UNIX, SUFFIX, runtime_folders
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, outlets, targets
+from sniff.config import AlertSettings
 from sniff.outlet_settings import OutletSettings
 
 ROTATE, KEEP_FREE, NAME = "size:64MB,time:1d", "1GB", "site"
@@ -25,6 +26,7 @@ class Plan:
     socket: Path | None
     status_port: int | None
     outlets: OutletSettings | None = None
+    alert: AlertSettings | None = None
 
     @property
     def name(self) -> str:
@@ -34,7 +36,8 @@ class Plan:
 
 def plan(args: argparse.Namespace) -> Plan:
     """Flags, and behind them the configuration. Ends with exit code 2 for what cannot be meant."""
-    told = targets.configured().box
+    configured = targets.configured()
+    told = configured.box
     try:
         rotate = args.rotate or arguments.rotation(told.rotate or ROTATE)
         keep_free = args.keep_free if args.keep_free is not None else arguments.octets(told.keep_free or KEEP_FREE)
@@ -48,10 +51,10 @@ def plan(args: argparse.Namespace) -> Plan:
         raise Failure(f"{folder}: {error.strerror}; name another --folder", UNREADABLE) from None
     socket = Path(args.socket) if args.socket else _socket(name)
     port = args.status_port if args.status_port is not None else told.status
-    if args.metrics is None and told.metrics is not None and targets.configured().outlets.metrics is None:
+    if args.metrics is None and told.metrics is not None and configured.outlets.metrics is None:
         args.metrics = str(told.metrics)
-    wanted = outlets.settings_of(args)
-    return Plan(folder / f"{name}.mcap", rotate, args.keep or told.keep, keep_free, socket, port, wanted)
+    path, keep = folder / f"{name}.mcap", args.keep or told.keep
+    return Plan(path, rotate, keep, keep_free, socket, port, outlets.settings_of(args), configured.alert)
 
 
 def _socket(name: str) -> Path | None:

@@ -95,7 +95,7 @@ class Box:
             try:
                 if not self._begin(caught):
                     return 0
-                with telling.alerting(self._printers), outlets.telling((), self._telling):
+                with telling.alerting(self._printers, self._told.alert), outlets.telling((), self._telling):
                     self._listen(caught)
             finally:
                 if self._closing is not None:

@@ -75,13 +75,14 @@ def run(args: argparse.Namespace) -> int:
         raise Failure("--before, --after: round which trigger? say with --on FILTER or --on CODE", USAGE)
     telling.refuse_triggers(args.on, buses)
     told_to = outlets.prepare(outlets.settings_of(args))
+    alert = targets.configured().alert  # before it begins: what becomes of the configuration then ends no capture
     record = RecordSpec(path, args.rotate, args.keep, before, after, args.keep_free)
     with until_interrupted():  # from before it begins: else it might go on with nobody who ends it
         lives = listening.start_all(buses, record, args.duration, args.count, watched=False)
         try:
             printers = [printing.Printer(live, quiet=True) for live in lives]
             telling.add_triggers(printers, args.on)
-            with telling.alerting(printers), outlets.telling(lives, told_to) as printers[0].telling:
+            with telling.alerting(printers, alert), outlets.telling(lives, told_to) as printers[0].telling:
                 code = listening.run(printers, not args.quiet)
         except BaseException:
             lives[0].stop()

@@ -12,6 +12,7 @@ from sniff.analysis.sanitizing import sanitized
 from sniff.bus.triggers import Triggers
 from sniff.cli import USAGE, Failure, targets
 from sniff.cli.printing import Printer
+from sniff.config import AlertSettings
 from sniff.filter import Scope
 
 
@@ -37,9 +38,8 @@ def _triggers(words: Sequence[str], dissector: Dissector, scope: Scope) -> Trigg
 
 
 @contextlib.contextmanager
-def alerting(printers: Sequence[Printer]) -> Iterator[None]:
+def alerting(printers: Sequence[Printer], settings: AlertSettings | None) -> Iterator[None]:
     """Meanwhile whoever the configuration names is told what is new about the buses."""
-    settings = targets.configured().alert
     if settings is None:
         yield
         return

@@ -1,6 +1,7 @@
 """sniff485.toml: buses by name, and errors that say where."""
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -32,6 +33,16 @@ def test_the_folder_above_counts(tmp_path: Path) -> None:
     inner = tmp_path / "one" / "two"
     inner.mkdir(parents=True)
     assert load(inner).buses["a"].port == "x"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a folder that is in use cannot be removed there")
+def test_a_current_folder_that_is_gone_is_said(tmp_path: Path, monkeypatch) -> None:
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+    with pytest.raises(ConfigError, match="the current folder is not there any more"):
+        load()
 
 
 @pytest.mark.parametrize(
