@@ -14,14 +14,14 @@ from functools import partial
 
 from dissectors.frame import Chunk
 from dissectors.line import MS, NS_PER_S, LineSettings
-from sniff.capture.disk_watch import SLOW, DiskWatch
+from sniff.capture.captured_bus import FAR, CapturedBus
+from sniff.capture.disk_watch import SLOW
 from sniff.capture.frame_counter import FrameCounter
 from sniff.capture.ipc import (
     LOSSY,
     IpcError,
     IpcKind,
     MessageSplitter,
-    Status,
     decode_derived,
     decode_trigger,
     encode_status,
@@ -60,21 +60,6 @@ LOOK_EVERY = 0.02
 """Seconds between words to the main process, and between looks at the files, while they are closed."""
 
 _COMMAND_SIZE = 64 * 1024
-_FAR = 1 << 62
-
-
-@dataclass
-class _Bus:
-    """A source and what the loop knows of it."""
-
-    index: int
-    source: Source
-    recorder: Recorder | None = None
-    ring: TriggerRing | None = None
-    fd: int | None = None
-    due: int = _FAR
-    octets: int = 0
-    ended: bool = False
 
 
 @dataclass
@@ -83,8 +68,10 @@ class CaptureLoop:
 
     `sessions`: of the sources, in their order; where settings are searched for, the first item of a bus says so.
     `end_at`, `count`: its limits, ns on the clock and frames of all buses. `round_triggers`: ns before and after a
-    trigger that are recorded, and nothing else is. `watched`: whether somebody looks at what
-    comes as it comes.
+    trigger that are recorded, and nothing else is. `watched`: whether somebody looks at what comes as it comes.
+
+    `reason`: why it ends, in words, None before; `at_end`: because there is nothing more to read. `closing`: whether
+    its files are being closed.
     """
 
     clock: Clock
@@ -99,15 +86,21 @@ class CaptureLoop:
     round_triggers: tuple[int, int] | None = None
     sessions: list[Session] = field(default_factory=list)
     watched: bool = True
-    reason: str | None = None
-    at_end: bool = False
-    closing: bool = False
-    _hurried: bool = False
-    _offset: int = 0
-    _due: int = _FAR
-    _runs: RunWatch = field(default_factory=lambda: RunWatch(0))
-    _heard: bool = False  # since the last step
-    _buses: list[_Bus] = field(default_factory=list)
+    reason: str | None = field(default=None, init=False)
+    at_end: bool = field(default=False, init=False)
+    closing: bool = field(default=False, init=False)
+    _hurried: bool = field(default=False, init=False)
+    _offset: int = field(default=0, init=False)  # of the wall clock from the capture's, as told last, ns
+    _due: int = field(default=FAR, init=False)  # of the bus that is due first
+    _heard: bool = field(default=False, init=False)  # since the last step
+    _buses: list[CapturedBus] = field(default_factory=list, init=False)
+    _splitter: MessageSplitter = field(default_factory=MessageSplitter, init=False)
+    _waiting: Waiting = field(init=False)
+    _runs: RunWatch = field(init=False)
+    _beat_at: int = field(init=False)  # ns, as those that follow
+    _beat_while_busy: int = field(init=False)
+    _busy_until: int = field(init=False)
+    _status_at: int = field(init=False)
 
     def run(self) -> str:
         """Capture; why it ended, in words."""
@@ -119,21 +112,12 @@ class CaptureLoop:
     def begin(self) -> None:
         """Take what is there at first; `step` does one turn from then on, until there is a `reason` to end."""
         self._waiting = Waiting()
-        recorders: list[Recorder | None] = [*self.recorders] or [None] * len(self.sources)
-        self._buses = [
-            _Bus(index, source, recorder, self._ring(recorder))
-            for index, (source, recorder) in enumerate(zip(self.sources, recorders, strict=True))
-        ]
-        self._splitter = MessageSplitter()
-        self._counters = [FrameCounter(session) for session in self.sessions] if self.count is not None else []
-        self._watches = [DiskWatch() for _ in self.recorders]
-        self._seeking = {index for index, session in enumerate(self.sessions) if "line" in session.unknown}
-        self._unknown = {index for index, session in enumerate(self.sessions) if session.unknown}
-        self._beat_while_busy = BEAT if self.watched or self._unknown or self._counters else UNWATCHED_BEAT
+        self._buses = list(map(self._bus, range(len(self.sources))))
+        is_awaited = self.watched or any(bus.is_unknown or bus.counter is not None for bus in self._buses)
+        self._beat_while_busy = BEAT if is_awaited else UNWATCHED_BEAT
         now = self.clock.now()
-        self._beat_at = self._status_at = now
+        self._beat_at = self._status_at = self._busy_until = now
         self._runs = RunWatch(now)
-        self._busy_until = now
         if self.commands is not None:
             self.commands.setblocking(False)
             self._waiting.register(self.commands.fileno(), self._take_commands)
@@ -155,8 +139,15 @@ class CaptureLoop:
         self._beat(self.clock.now())
         return self.reason or "stopped"
 
-    def _ring(self, recorder: Recorder | None) -> TriggerRing | None:
-        return TriggerRing(recorder, *self.round_triggers) if self.round_triggers and recorder is not None else None
+    def _bus(self, index: int) -> CapturedBus:
+        recorder = self.recorders[index] if self.recorders else None
+        ring = TriggerRing(recorder, *self.round_triggers) if self.round_triggers and recorder is not None else None
+        bus = CapturedBus(index, self.sources[index], recorder, ring)
+        if self.sessions:
+            session = self.sessions[index]
+            bus.seeks_line, bus.is_unknown = "line" in session.unknown, bool(session.unknown)
+            bus.counter = FrameCounter(session) if self.count is not None else None
+        return bus
 
     def finish(self) -> int:
         """Close the files; a slow disk is waited for, and said. The exit code: LOSSY when not everything is in them."""
@@ -166,6 +157,20 @@ class CaptureLoop:
                 bus.ring.finish()
         for recorder in self.recorders:
             recorder.finish()
+        self._wait_for_files()
+        until = time.monotonic() + SYNC_PATIENCE
+        for recorder in self.recorders:
+            recorder.give_up()
+            if recorder.finished:
+                recorder.synced(max(0.0, until - time.monotonic()))
+        for bus in self._buses:
+            for text in bus.recorder.notices if bus.recorder is not None else ():  # of the last look at the file
+                self.outlet.item(bus.index, LineEvent(bus.source.now(), LineEventKind.NOTE, text))
+            self.outlet.post(self._status(bus))
+        return LOSSY if any(recorder.trouble or recorder.lost_octets for recorder in self.recorders) else 0
+
+    def _wait_for_files(self) -> None:
+        """Until the disk has taken all, or its time is over, or somebody wants it no more."""
         until = time.monotonic() + CLOSING_PATIENCE
         said = time.monotonic() + CLOSING_EVERY
         while not all(recorder.finished for recorder in self.recorders) and not self._hurried:
@@ -179,16 +184,6 @@ class CaptureLoop:
             for fd, call in self._waiting.wait(LOOK_EVERY):
                 if fd not in [bus.fd for bus in self._buses]:
                     call()
-        until = time.monotonic() + SYNC_PATIENCE
-        for recorder in self.recorders:
-            recorder.give_up()
-            if recorder.finished:
-                recorder.synced(max(0.0, until - time.monotonic()))
-        for bus in self._buses:
-            for text in bus.recorder.notices if bus.recorder is not None else ():  # of the last look at the file
-                self.outlet.item(bus.index, LineEvent(bus.source.now(), LineEventKind.NOTE, text))
-            self.outlet.post(encode_status(self.status(bus.index)))
-        return LOSSY if any(recorder.trouble or recorder.lost_octets for recorder in self.recorders) else 0
 
     def stop(self, reason: str) -> None:
         """End soon; the first reason counts. Said again while files are closed, they are not waited for any longer."""
@@ -224,15 +219,14 @@ class CaptureLoop:
         for bus in self._buses:
             if bus.fd is not None:
                 text = f"nobody knows how many: this process did not run for {time / NS_PER_S:.0f} s"
-                self._keep(bus.index, LineEvent(bus.source.now(), LineEventKind.DROPPED, text, -1))
+                self._say(bus, LineEventKind.DROPPED, text, -1)
 
-    def _take(self, bus: _Bus) -> bool:
+    def _take(self, bus: CapturedBus) -> bool:
         """One read of a source; whether it gave anything."""
         source = bus.source
-        index = bus.index
         items = source.read()
         for item in items:
-            self._keep(index, item)
+            self._keep(bus, item)
             if isinstance(item, Chunk):
                 bus.octets += len(item.octets)
         if items:
@@ -242,35 +236,30 @@ class CaptureLoop:
             self._watch(bus, fd)
         deadline = source.deadline()
         if deadline != bus.due:
-            self._set_due(bus, _FAR if deadline is None else deadline)
+            self._set_due(bus, FAR if deadline is None else deadline)
         if source.ended and not bus.ended:
             bus.ended = True
-            self._set_due(bus, _FAR)
+            self._set_due(bus, FAR)
             self._watch(bus, None)
             if all(other.ended for other in self._buses):
                 self.at_end = self.reason is None
                 self.stop("nothing more to read")
         return bool(items)
 
-    def _set_due(self, bus: _Bus, due: int) -> None:
+    def _set_due(self, bus: CapturedBus, due: int) -> None:
         if bus.due != due:
             bus.due = due
             self._due = min(other.due for other in self._buses)
 
-    def _keep(self, index: int, item: Item) -> None:
-        recorder, ring = self._buses[index].recorder, self._buses[index].ring
-        if ring is not None:
-            ring.take(item)
-        elif recorder is not None:
-            if isinstance(item, Chunk):
-                recorder.chunk(item)
-            else:
-                recorder.line(item)
-        if self._counters:
-            self._counters[index].item(item)
-        self.outlet.item(index, item)
+    def _keep(self, bus: CapturedBus, item: Item) -> None:
+        bus.keep(item)
+        self.outlet.item(bus.index, item)
 
-    def _watch(self, bus: _Bus, fd: int | None) -> None:
+    def _say(self, bus: CapturedBus, kind: LineEventKind, text: str, count: int = 0) -> None:
+        """Something happened to a bus just now; the recording and the main process are told."""
+        self._keep(bus, LineEvent(bus.source.now(), kind, text, count))
+
+    def _watch(self, bus: CapturedBus, fd: int | None) -> None:
         if bus.fd is not None:
             self._waiting.unregister(bus.fd)
         bus.fd = fd
@@ -282,7 +271,7 @@ class CaptureLoop:
     def _beat(self, now: int) -> None:
         for recorder in self.recorders:
             recorder.tick(now)
-        news = self._watch_disk(now)
+        news = self._watch_files(now)
         for bus in self._buses:
             self.outlet.droppable(encode_tick(bus.index, bus.source.now()))
         if news or now >= self._status_at:
@@ -299,31 +288,28 @@ class CaptureLoop:
             self._beat_at = min(self._beat_at, self.end_at)
             if now >= self.end_at:
                 self.stop("the time asked for is over")
-        if self.count is not None:
-            for counter, bus in zip(self._counters, self._buses, strict=True):
-                counter.advance(bus.source.now())
-            if sum(counter.frames for counter in self._counters) >= self.count:
-                self.stop("the number of frames asked for is reached")
+        if self.count is not None and self._count_frames() >= self.count:
+            self.stop("the number of frames asked for is reached")
         if not self.recorders and not self.outlet.open:
             self.stop("nobody listens")
 
-    def _watch_disk(self, now: int) -> bool:
+    def _count_frames(self) -> int:
+        """Of all buses so far."""
+        frames = 0
+        for bus in self._buses:
+            if bus.counter is not None:
+                bus.counter.advance(bus.source.now())
+                frames += bus.counter.frames
+        return frames
+
+    def _watch_files(self, now: int) -> bool:
         """Say, in the recording too, what is new about the files and the disk; whether anything is."""
-        news = False
-        for index, (recorder, watch) in enumerate(zip(self.recorders, self._watches, strict=True)):
-            told = [recorder.notices.popleft() for _ in range(len(recorder.notices))]
-            # trouble is said, and explains that nothing is written; so does that nobody ran
-            runs = self._runs.runs_since(now)
-            explained = recorder.trouble is not None or (runs is not None and runs < SLOW)
-            slow = None
-            if explained:
-                watch.excuse(recorder.lost_octets)
-            else:
-                slow = watch.see(now, recorder.behind(now), recorder.syncing, recorder.lost_octets)
-            for text in told + ([slow] if slow is not None else []):
-                news = True
-                self._keep(index, LineEvent(self._buses[index].source.now(), LineEventKind.NOTE, text))
-        return news
+        runs = self._runs.runs_since(now)
+        was_held_up = runs is not None and runs < SLOW
+        news = [(bus, text) for bus in self._buses for text in bus.file_news(now, was_held_up)]
+        for bus, text in news:
+            self._say(bus, LineEventKind.NOTE, text)
+        return bool(news)
 
     def _check_clock(self) -> None:
         offset = self.clock.drift()
@@ -332,33 +318,14 @@ class CaptureLoop:
             off = f"{offset / MS:+.3f} ms" if abs(offset) < NS_PER_S else f"{offset / NS_PER_S:+.3f} s"
             text = f"wall clock is {off} from the capture's"
             for bus in self._buses:
-                self._keep(bus.index, LineEvent(bus.source.now(), LineEventKind.CLOCK, text, offset))
+                self._say(bus, LineEventKind.CLOCK, text, offset)
 
     def _send_status(self) -> None:
         for bus in self._buses:
-            self.outlet.droppable(encode_status(self.status(bus.index)))
+            self.outlet.droppable(self._status(bus))
 
-    def status(self, index: int) -> Status:
-        """How one bus is doing."""
-        octets, dropped = self._buses[index].octets, self.outlet.dropped[index]
-        if not self.recorders:
-            return Status(index, octets=octets, dropped=dropped, priority=self.priority)
-        recorder, ring = self.recorders[index], self._buses[index].ring
-        return Status(
-            index,
-            "" if recorder.gone else str(recorder.path),
-            recorder.size,
-            octets,
-            dropped,
-            recorder.lost_octets,
-            self.priority,
-            recorder.trouble or "",
-            self._watches[index].behind / NS_PER_S,
-            recorder.unwritten,
-            self.closing,
-            0 if ring is None else ring.omitted,
-            recorder.taken_away,
-        )
+    def _status(self, bus: CapturedBus) -> bytes:
+        return encode_status(bus.status(self.outlet.dropped[bus.index], self.priority, self.closing))
 
     # -- what the main process says ----------------------------------------------------------------------------
 
@@ -382,56 +349,63 @@ class CaptureLoop:
                 return
             if not self.recorders:
                 self.stop("the main process is gone")
-            elif self._seeking:
+            elif any(bus.seeks_line for bus in self._buses):
                 self.stop("the main process is gone, which searched for the line settings")
-            elif self.count is not None and self._unknown:
+            elif self.count is not None and any(bus.is_unknown for bus in self._buses):
                 self.stop("the main process is gone, which searched for the protocol whose frames are counted")
 
-    def _command(self, kind: int, bus: int, body: bytes) -> None:
+    def _command(self, kind: int, index: int, body: bytes) -> None:
         if kind == IpcKind.STOP:
             self.stop("stopped")
-        elif kind == IpcKind.FOUND and bus < len(self._buses):
-            change = SettingsChange.parse(body.decode("utf-8", "replace"))
-            self._seeking.discard(bus)
-            self._unknown.discard(bus)
-            self._take(self._buses[bus])
-            self._settings(self._buses[bus], replace(change, searching=False, found=True))
-        elif kind == IpcKind.TRIGGER and bus < len(self._buses):
+            return
+        if index >= len(self._buses):
+            return
+        bus = self._buses[index]
+        if kind == IpcKind.FOUND:
+            self._find(bus, SettingsChange.parse(body.decode("utf-8", "replace")))
+        elif kind == IpcKind.TRIGGER:
             self._fire(bus, *decode_trigger(body))
-        elif kind in (IpcKind.MARK, IpcKind.UNMARK) and bus < len(self._buses):
-            self._mark(bus, LineEventKind.MARK if kind == IpcKind.MARK else LineEventKind.UNMARK, *decode_trigger(body))
-        elif kind == IpcKind.DERIVED and bus < len(self.recorders):
-            derived = decode_derived(body)
-            ring = self._buses[bus].ring
-            if ring is None or ring.keeps(derived.log_time):
-                self.recorders[bus].derived(derived)
-        elif kind == IpcKind.RECONFIGURE and bus < len(self._buses):
-            source = self._buses[bus].source
-            line = body.decode("ascii", "replace")
-            self._take(self._buses[bus])  # what is there was heard with the settings before
-            try:
-                source.reconfigure(LineSettings.parse(line))
-            except (PortError, ValueError) as error:
-                self._keep(bus, LineEvent(source.now(), LineEventKind.REFUSED, refusal(line, str(error))))
-            self._take(self._buses[bus])
+        elif kind == IpcKind.MARK:
+            self._mark(bus, LineEventKind.MARK, *decode_trigger(body))
+        elif kind == IpcKind.UNMARK:
+            self._mark(bus, LineEventKind.UNMARK, *decode_trigger(body))
+        elif kind == IpcKind.DERIVED:
+            bus.keep_derived(decode_derived(body))
+        elif kind == IpcKind.RECONFIGURE:
+            self._reconfigure(bus, body.decode("ascii", "replace"))
 
-    def _mark(self, bus: int, what: LineEventKind, time: int, text: str) -> None:
+    def _find(self, bus: CapturedBus, found: SettingsChange) -> None:
+        """What a search came to."""
+        bus.seeks_line = bus.is_unknown = False
+        self._take(bus)
+        self._settings(bus, replace(found, searching=False, found=True))
+
+    def _reconfigure(self, bus: CapturedBus, line: str) -> None:
+        """Change the line settings of its port, or say why they are not taken."""
+        self._take(bus)  # what is there was heard with the settings before
+        try:
+            bus.source.reconfigure(LineSettings.parse(line))
+        except (PortError, ValueError) as error:
+            self._say(bus, LineEventKind.REFUSED, refusal(line, str(error)))
+        self._take(bus)
+
+    def _mark(self, bus: CapturedBus, kind: LineEventKind, time: int, text: str) -> None:
         """What a person wrote about a moment; events stand in order of time, so it says how long ago that was."""
-        now = self._buses[bus].source.now()
-        self._keep(bus, LineEvent(now, what, text, max(0, now - time)))
+        now = bus.source.now()
+        self._keep(bus, LineEvent(now, kind, text, max(0, now - time)))
 
-    def _fire(self, bus: int, time: int, text: str) -> None:
+    def _fire(self, bus: CapturedBus, time: int, text: str) -> None:
         """A trigger: of a recording that keeps only what surrounds such, that of all buses; else a mark on its own."""
-        event = LineEvent(self._buses[bus].source.now(), LineEventKind.TRIGGER, text)
-        if self._buses[bus].ring is None:
+        event = LineEvent(bus.source.now(), LineEventKind.TRIGGER, text)
+        if bus.ring is None:
             self._keep(bus, event)
             return
-        self.outlet.item(bus, event)
+        self.outlet.item(bus.index, event)
         for other in self._buses:
             if other.ring is not None:
-                said = text if other.index == bus else f"on {self.sessions[bus].bus}: {text}"
+                said = text if other is bus else f"on {self.sessions[bus.index].bus}: {text}"
                 other.ring.fire(time, said)
 
-    def _settings(self, bus: _Bus, change: SettingsChange) -> None:
+    def _settings(self, bus: CapturedBus, change: SettingsChange) -> None:
         """Say in the recording and to the main process what the settings are from here on."""
-        self._keep(bus.index, LineEvent(bus.source.now(), LineEventKind.SETTINGS, str(change)))
+        self._say(bus, LineEventKind.SETTINGS, str(change))
