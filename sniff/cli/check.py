@@ -65,12 +65,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
         choices=(*SEVERITIES, "never"),
         default="warning",
         metavar="SEVERITY",
-        help="exit with 1 at this severity or above (default warning; never: always 0)",
+        help="exit with 1 at this severity or above (default: warning; never: always 0)",
     )
     parser.add_argument("--only", action="append", default=[], metavar="CODE", help="only these codes or prefixes")
     parser.add_argument("--ignore", action="append", default=[], metavar="CODE", help="without these codes or prefixes")
     parser.add_argument(
-        "--duration", type=arguments.duration, metavar="TIME", help="a port: how long to listen (default 30 s)"
+        "--duration", type=arguments.duration, metavar="TIME", help="a port: how long to listen (default: 30s)"
     )
 
 

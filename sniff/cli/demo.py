@@ -21,11 +21,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `demo`."""
     arguments.add_line(parser, auto=False)
     arguments.add_devices(parser)
-    parser.add_argument("--seed", type=int, default=485, metavar="N", help="which faults strike when (default 485)")
+    parser.add_argument("--seed", type=int, default=485, metavar="N", help="which faults strike when (default: 485)")
     parser.add_argument("--clean", action="store_true", help="no faults on the line; who is absent stays so")
     arguments.add_recording(parser, "record to FILE (.mcap)")
     parser.add_argument(
-        "--duration", type=arguments.duration, metavar="TIME", help="stop after (default without a terminal: 10 s)"
+        "--duration", type=arguments.duration, metavar="TIME", help="stop after (default: with no terminal 10s)"
     )
     parser.add_argument(
         "--json", action="store_true", help="JSON lines instead of the terminal UI: frames, values, findings, health"

@@ -35,7 +35,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=arguments.duration,
         default=TIMEOUT,
         metavar="TIME",
-        help="give up after (default 2m); a bus that talks seldom needs longer",
+        help="give up after (default: 2m); a bus that talks seldom needs longer",
     )
     parser.add_argument("--json", action="store_true", help="one JSON object")
 

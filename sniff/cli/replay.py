@@ -20,7 +20,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--to", required=True, metavar="pty|tcp|tcp:PORT", help="a new pseudo-terminal, or a TCP port of this machine"
     )
     filtering.add_filter(parser, "only the octets of frames that match")
-    parser.add_argument("--speed", type=float, default=1.0, metavar="X", help="2 is twice as fast (default 1)")
+    parser.add_argument("--speed", type=float, default=1.0, metavar="X", help="2 is twice as fast (default: 1)")
 
 
 def run(args: argparse.Namespace) -> int:

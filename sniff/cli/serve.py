@@ -40,10 +40,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_devices(parser)
     arguments.add_recording(parser, "a port: recording (.mcap); default: a new name here")
     parser.add_argument(
-        "--host", default="127.0.0.1", metavar="ADDRESS", help="address to serve at (default 127.0.0.1)"
+        "--host", default="127.0.0.1", metavar="ADDRESS", help="address to serve at (default: 127.0.0.1)"
     )
     parser.add_argument(
-        "--port", type=arguments.tcp_port, default=PORT, metavar="N", help="default 8485; 0: any free one"
+        "--port", type=arguments.tcp_port, default=PORT, metavar="N", help="default: 8485; 0: any free one"
     )
     parser.add_argument("--allow-remote", action="store_true", help="let others than this machine look; needs a token")
     parser.add_argument(

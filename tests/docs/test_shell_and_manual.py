@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from docs.generate.commands import all_commands
+from docs.generate.commands import Command, all_commands
 from docs.generate.completion import completions
 from docs.generate.manual import escaped, manual_pages
 from sniff.cli import COMMANDS, main
@@ -25,6 +27,16 @@ def test_every_command_and_option_has_its_place_in_a_manual_page() -> None:
             for group in one.groups:
                 for argument in group.arguments:
                     assert escaped(argument.written) in page, (command.name, argument.written)
+
+
+def test_defaults_are_said_alike() -> None:
+    def said(command: Command) -> Iterator[str]:
+        for group in command.groups:
+            yield from (one.says for one in group.arguments)
+        for part in command.parts:
+            yield from said(part)
+
+    assert [text for text in said(all_commands()) if re.search(r"(^|\(|; )default ", text)] == []
 
 
 @pytest.mark.skipif(shutil.which("groff") is None, reason="no groff here")
