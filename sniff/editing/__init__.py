@@ -1,1 +1,1 @@
-"""Captures made of captures: merged, cut, compared, with other settings, without names."""
+"""Captures made of captures: merged, cut, compared, without names."""
