@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from dissectors.columns import Reads
@@ -22,9 +24,6 @@ class CleanBatches:
         self._runs: list[BatchRun] = []
         self._count = self._octets = 0
 
-    def __bool__(self) -> bool:
-        return bool(self._runs)
-
     @staticmethod
     def takes(batch: Batch) -> bool:
         """Whether a batch is no larger than a block may be (a foreign one can be)."""
@@ -35,17 +34,20 @@ class CleanBatches:
         """The same of all batches of a run together."""
         return run.entries <= BLOCK_READS and run.size <= _MOST_RUN and max(run.starts) < _LATEST
 
-    def fits(self, run: BatchRun) -> bool:
-        """Whether what is collected stays within a block with one more run."""
-        return self._count + run.entries <= BLOCK_READS and self._octets + run.size <= BLOCK_OCTETS
-
-    def add(self, run: BatchRun) -> None:
-        """Take the next."""
+    def add(self, run: BatchRun) -> Iterator[Reads]:
+        """Take the next; gives what was collected where a block holds no more."""
+        if self._count + run.entries > BLOCK_READS or self._octets + run.size > BLOCK_OCTETS:
+            yield from self.rest()
         self._runs.append(run)
         self._count += run.entries
         self._octets += run.size
 
-    def take(self) -> Reads:
+    def rest(self) -> Iterator[Reads]:
+        """What is collected, if anything."""
+        if self._runs:
+            yield self._take()
+
+    def _take(self) -> Reads:
         """All entries but empty ones (a foreign file's); nothing is collected any more."""
         runs = self._runs
         self._runs = []

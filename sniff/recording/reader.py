@@ -8,54 +8,35 @@ words what is wrong and where the file ends.
 from __future__ import annotations
 
 import os
-import stat
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from dissectors.columns import Reads
 from sniff.engine.blocks import BLOCK_OCTETS, Block, blocks_of, plain_reads
-from sniff.engine.capture import CaptureError
 from sniff.engine.session import Completeness, Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
 from sniff.formats.files import explain, open_capture
 from sniff.formats.several_buses import SeveralBuses
 from sniff.recording import scan
 from sniff.recording.batch import Batch
 from sniff.recording.batch_run import BatchRun, run_of
+from sniff.recording.beginning import read_beginning
 from sniff.recording.clean_batches import CleanBatches
 from sniff.recording.completeness import completeness_of
 from sniff.recording.joiner import Joiner
 from sniff.recording.line_messages import line_event
 from sniff.recording.messages import Head, MessagePass
-from sniff.recording.topics import (
-    BUS,
-    PART_RECORD,
-    PROFILE,
-    PROFILE_MEDIA_TYPE,
-    PROFILE_SUFFIX,
-    RAW,
-    SESSION_RECORD,
-    VERSION,
-    topics_of,
-)
+from sniff.recording.topics import topics_of
 
 if TYPE_CHECKING:
     from sniff.engine.table import Table
 
 FAR = (1 << 63) - 1
 """ns; after everything."""
-
-MOST_PROFILE = 1 << 20
-"""Octets of an attached device profile; a longer one is passed over."""
-MOST_PROFILES = 64
-
-MOST_BUSES = 256
-"""In one file: as many as a capture can have."""
 
 
 def read(path: str | Path) -> McapCapture | SeveralBuses:
@@ -73,32 +54,41 @@ def buses_of(path: str | Path) -> list[McapCapture]:
 class McapCapture:
     """A recording opened for reading; each pass reads the file again, a live one up to where it is then.
 
-    `bus`: which of the buses in it, from 0; `sessions`: of all of them. `part`, `first_chunk`, `octets_before`: what
-    the file says about the parts before it.
+    `bus`: which of the buses in it, from 0; `sessions`: of all of them.
     """
 
     def __init__(self, path: Path, bus: int = 0) -> None:
         self.path = path
         self.bus = bus
-        self.sessions: list[Session] = []
-        self.session = Session.from_metadata({})
-        self.part = 1
-        self.first_chunk = 0
-        self.octets_before = 0
-        self._known_first = False
         self._completeness: Completeness | None = None
         self._index = scan.ChunkIndex()
         self._only: Sequence[int] = ()
         try:
-            self._read_start()
+            begin = read_beginning(path, bus)
+            self.sessions, self.session, self._began = begin.sessions, begin.session, begin.session
+            self._place = begin.place
             own = topics_of([session.bus for session in self.sessions] or [""])
             self._known = [topic for each in own for topic in each.values()]
             self._raw_topic, self._line_topic = own[min(bus, len(own) - 1)].values()
-            self._began = self.session
             if self.session.unknown:
                 self._look_for_what_was_found()
         except OSError as error:
             raise explain(path, error) from None
+
+    @property
+    def part(self) -> int:
+        """Number among the parts of its recording, from 1."""
+        return self._place.part
+
+    @property
+    def first_chunk(self) -> int:
+        """Number of its first read: so many are in the parts before it."""
+        return self._place.first_chunk or 0
+
+    @property
+    def octets_before(self) -> int:
+        """In the parts before it."""
+        return self._place.octets_before
 
     # what a capture gives
 
@@ -154,9 +144,7 @@ class McapCapture:
             try:
                 for piece in self._runs_of(one, joiner, columns and since is None):
                     if isinstance(piece, BatchRun):
-                        if not clean.fits(piece) and clean:
-                            yield clean.take()
-                        clean.add(piece)
+                        yield from clean.add(piece)
                         continue
                     head, batch = piece
                     if one.jumped:
@@ -164,20 +152,14 @@ class McapCapture:
                     if since is not None and head[2] < since:
                         joiner.skip(head[1], batch)
                     elif columns and clean.takes(batch) and joiner.follows(head[1], batch.count):
-                        run = BatchRun.alone(batch)
-                        if not clean.fits(run) and clean:
-                            yield clean.take()
-                        clean.add(run)
+                        yield from clean.add(BatchRun.alone(batch))
                     else:
-                        if clean:
-                            yield clean.take()
+                        yield from clean.rest()
                         yield from joiner.raw(head[1], batch)
             except OSError:
-                if clean:
-                    yield clean.take()
+                yield from clean.rest()
                 raise
-            if clean:
-                yield clean.take()
+            yield from clean.rest()
             if alone:
                 self._note(one, joiner)
 
@@ -292,7 +274,7 @@ class McapCapture:
         return self._joiner(None)
 
     def _joiner(self, since: int | None) -> Joiner:
-        return Joiner(self.first_chunk if since is None and self._known_first else None)
+        return Joiner(self._place.first_chunk if since is None else None)
 
     def _note(self, one: MessagePass, joiner: Joiner) -> Completeness:
         """Keep what a whole pass found, and where the chunks are, for later jumps."""
@@ -302,20 +284,6 @@ class McapCapture:
 
     # the start
 
-    def _read_start(self) -> None:
-        with open_capture(self.path) as stream:
-            status = os.fstat(stream.fileno())
-            if not stat.S_ISREG(status.st_mode):
-                raise CaptureError(f"{self.path}: not a regular file; copy it to one first")
-            if status.st_size == 0:
-                raise CaptureError(f"{self.path}: empty file; nothing was recorded in it")
-            magic = stream.read(len(scan.MAGIC))
-            if magic != scan.MAGIC:
-                raise CaptureError(f"{self.path}: not an MCAP file; {_looks_like(magic)}")
-            ours = self._read_first_records(stream, scan.Report(status.st_size))
-        if not ours:
-            raise CaptureError(f"{self.path}: an MCAP file, but not a recording of a serial line (no {RAW} in it)")
-
     def _look_for_what_was_found(self) -> None:
         """The session with what a search found, if it did: said on /line, since it was not known at the start."""
         for _, _, data in self.messages(self._line_topic):
@@ -324,62 +292,6 @@ class McapCapture:
             if change is not None and change.found:
                 self.session = self.session.found(change.line, change.protocol)
                 return
-
-    def _read_first_records(self, stream: BinaryIO, report: scan.Report) -> bool:
-        """Take the session from the records before the first chunk; whether this is a recording of ours."""
-        from mcap.records import Header
-
-        ours = False
-        for record in scan.records(stream, report):
-            if record.body is None:
-                continue
-            if record.opcode == scan.CHUNK:
-                return ours or any(topic.startswith(RAW) for topic in _topics(record.body))
-            if record.opcode == scan.HEADER:
-                header = scan.parse(Header, record.body)
-                ours = ours or (header is not None and header.profile == PROFILE)
-            elif record.opcode == scan.METADATA:
-                ours = self._take_metadata(record.body) or ours
-            elif record.opcode == scan.ATTACHMENT:
-                self._take_profile(record.body)
-        return ours
-
-    def _take_profile(self, body: bytes) -> None:
-        from mcap.records import Attachment
-
-        found = scan.parse(Attachment, body) if len(body) <= MOST_PROFILE else None
-        if found is None or found.media_type != PROFILE_MEDIA_TYPE or len(self.session.profiles) >= MOST_PROFILES:
-            return
-        name = found.name.removesuffix(PROFILE_SUFFIX)
-        document = found.data.decode("utf-8", "replace")
-        self.session = replace(self.session, profiles={**self.session.profiles, name: document})
-
-    def _take_metadata(self, body: bytes) -> bool:
-        from mcap.records import Metadata
-
-        found = scan.parse(Metadata, body)
-        if found is None or found.name not in (SESSION_RECORD, PART_RECORD):
-            return False
-        if found.name == SESSION_RECORD:
-            session = Session.from_metadata(found.metadata)
-            if len(self.sessions) >= MOST_BUSES:
-                raise CaptureError(f"{self.path}: over {MOST_BUSES} buses in it; no recording of sniff485 has as many")
-            self.sessions.append(session)
-            if len(self.sessions) == self.bus + 1:
-                self.session = replace(session, profiles=self.session.profiles)
-            return True
-        version = _number(found.metadata.get("version"), VERSION)
-        if version > VERSION:
-            raise CaptureError(
-                f"{self.path}: written by a newer sniff485 (layout {version}, known is {VERSION}); use that one"
-            )
-        if _number(found.metadata.get(BUS), self.bus) != self.bus:
-            return True
-        self.part = _number(found.metadata.get("part"), 1)
-        self._known_first = "first_chunk" in found.metadata
-        self.first_chunk = _number(found.metadata.get("first_chunk"), 0)
-        self.octets_before = _number(found.metadata.get("octets_before"), 0)
-        return True
 
 
 def _from(since: int, pieces: Iterator[Item | Reads]) -> Iterator[Item | Reads]:
@@ -393,26 +305,3 @@ def _from(since: int, pieces: Iterator[Item | Reads]) -> Iterator[Item | Reads]:
         else:
             octets = piece.octets[np.repeat(late, piece.lengths)]
             yield plain_reads(octets, piece.times[late], piece.lengths[late])
-
-
-def _topics(chunk: bytes) -> set[str]:
-    """Topics of the channels that a chunk record defines."""
-    from mcap.records import Channel
-
-    octets = scan.unpack_chunk(chunk)
-    if isinstance(octets, str):
-        return set()
-    found = (scan.parse(Channel, body) for opcode, body in scan.inner_records(octets) if opcode == scan.CHANNEL)
-    return {channel.topic for channel in found if channel is not None}
-
-
-def _number(text: str | None, default: int) -> int:
-    return int(text) if text is not None and text.isascii() and text.isdigit() and len(text) < 20 else default
-
-
-def _looks_like(magic: bytes) -> str:
-    if magic.startswith(b"#!sniff"):
-        return "it is a text capture; name it *.cap.txt"
-    if magic[:4] in (b"\n\r\r\n", b"\xd4\xc3\xb2\xa1", b"\xa1\xb2\xc3\xd4", b"\x4d\x3c\xb2\xa1", b"\xa1\xb2\x3c\x4d"):
-        return "it is a packet capture; name it *.pcap or *.pcapng"
-    return "choose a recording of sniff485, or the suffix that fits it"

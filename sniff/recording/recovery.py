@@ -33,7 +33,7 @@ def recover(source: str | Path, target: str | Path) -> Completeness:
     if wrong:
         sessions = [replace(one, notes={**one.notes, RECOVERED: found.text}) for one in sessions]
     first = buses[0]
-    firsts, before = (tuple(getattr(one, name) for one in buses) for name in ("first_chunk", "octets_before"))
+    firsts, before = tuple(one.first_chunk for one in buses), tuple(one.octets_before for one in buses)
     with create_part(target, sessions, PartPlace(first.part, firsts, before)) as writer:
         for _, bus, piece in _by_time(buses):
             if isinstance(piece, LineEvent):

@@ -37,12 +37,12 @@ def test_a_run_is_its_batches() -> None:
     assert run is not None
     assert (run.sequence, run.entries, run.last) == (41, 3, 9)
     together, one_by_one = CleanBatches(), CleanBatches()
-    together.add(run)
+    assert not list(together.add(run))
     for start, entries in BATCHES:
         batch = Batch.decode(data(start, entries))
         assert batch is not None
-        one_by_one.add(type(run).alone(batch))
-    a, b = together.take(), one_by_one.take()
+        assert not list(one_by_one.add(type(run).alone(batch)))
+    (a,), (b,) = together.rest(), one_by_one.rest()
     assert a.octets.tobytes() == b.octets.tobytes() == bytes(range(1, 7))
     assert a.times.tolist() == b.times.tolist() == [10_000, 10_007, 20_001]
     assert a.lengths.tolist() == b.lengths.tolist() == [2, 1, 3]

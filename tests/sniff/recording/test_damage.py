@@ -19,8 +19,9 @@ from sniff.engine.session import Item, LineEvent, LineEventKind, Session
 from sniff.formats import read
 from sniff.recording import scan
 from sniff.recording.batcher import Batcher
+from sniff.recording.beginning import MOST_BUSES
 from sniff.recording.part import PartFile
-from sniff.recording.reader import MOST_BUSES, McapCapture
+from sniff.recording.reader import McapCapture
 from sniff.recording.topic_message import Message
 from tests.seeds import IS_SEARCH
 

@@ -16,8 +16,8 @@ from sniff.devices import devices, noted, noted_devices, with_devices
 from sniff.engine.capture import Capture
 from sniff.engine.session import DEVICES_NOTE, LATEST
 from sniff.formats import read
+from sniff.recording.beginning import MOST_PROFILE
 from sniff.recording.mcap_writer import create
-from sniff.recording.reader import MOST_PROFILE
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
 
