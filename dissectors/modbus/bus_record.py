@@ -12,6 +12,7 @@ from dissectors.findings import Tally, together
 from dissectors.frame import Flaw
 from dissectors.late_speakers import LateSpeakers
 from dissectors.line import MS, Timing
+from dissectors.modbus.carried_over import CarriedOver
 from dissectors.modbus.poll_order import Neighbours
 from dissectors.modbus.station_record import Cycles, StationRecord
 from dissectors.modbus.text_changes import TextDamage
@@ -108,6 +109,7 @@ class BusRecord:
     damaged_here: Tally = field(default_factory=Tally)
     damaged_requests: Tally = field(default_factory=Tally)
     text_damage: TextDamage = field(default_factory=TextDamage)
+    carried_over: CarriedOver = field(default_factory=CarriedOver)
     strikes: Strikes = field(default_factory=Strikes)  # "master", "station 3" …
     late_speakers: LateSpeakers = field(default_factory=LateSpeakers)
     unasked: Tally = field(default_factory=Tally)

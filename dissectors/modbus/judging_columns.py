@@ -81,6 +81,7 @@ class _Judging:
         assert isinstance(last.event, Frame)
         judge.gaps.pass_by(last.event, int(rows.frames.start[stretch.stop - 2]))
         judge.torn.see(last.no, last.event, None, is_good_frame=True)
+        judge.seen.carried_over.begin_anew()
         judge.newest = int(closed.id[end - 1])
         judge.given_back = CutEcho()
 

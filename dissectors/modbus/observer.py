@@ -99,6 +99,8 @@ class ModbusFindings(RequestObserver):
         self.settle_request(station, transaction, asked, heard)
         if is_damaged:
             self._settle_damaged(station, transaction, asked, heard)
+        elif heard.answer or heard.code is not None:
+            self.seen.carried_over.begin_anew()
 
     def _came_back_in_pieces(self, asked: AskedRequest, stray: bytes, verdict: Verdict) -> bool:
         """Whether what came behind a request is its begin, cut short, and was no answer by the times of its pieces."""
@@ -285,6 +287,9 @@ class ModbusFindings(RequestObserver):
         stray = heard.stray
         if stray and asked.frame.protocol == RTU_NAME:
             station.text_damage.add(stray, sent_length(asked.frame.octets, stray))
+            self.seen.carried_over.hear(
+                asked.frame.octets, stray, transaction.end, transaction.request, transaction.response
+            )
         if heard.flaw is not None:
             station.flaw(heard.flaw).add(transaction.end, transaction.request, transaction.response)
             return

@@ -44,6 +44,7 @@ def judge(seen: BusRecord, timeout: int | None) -> tuple[Finding, ...]:
         *_of_gaps(seen),
         *_of_ends(seen),
         *of_text_changes(seen),
+        *_carried_over(seen),
         *_common_damage(seen, damage),
         *of_late_speakers(seen),
         *of_impatience(seen, timeout),
@@ -370,6 +371,20 @@ def _common_damage(seen: BusRecord, damage: DamageShare) -> list[Finding]:
     words += ": of each about as much as it sends" if among else ": too few, and too close together, to say whose"
     finding = tally.found(RULES["MB007"], "bus", words, note_if(seen.rare(damaged, asked, tally)))
     return [replace(finding if among else of_few(finding), count=answers, stations=() if among else tuple(struck))]
+
+
+def _carried_over(seen: BusRecord) -> Iterator[Finding]:
+    """Answers that end where the next one should begin."""
+    carried = seen.carried_over
+    if not carried.is_habit(sum(one.damaged.count for one in seen.stations.values())):
+        return
+    words = f"{counted(carried.tally.count, 'answer')} of {units(carried.units)} began in place of one answer and ended"
+    finding = carried.tally.found(RULES["MB024"], "bus", f"{words} in place of the next; put together they are good")
+    finding = replace(finding, stations=tuple(sorted(carried.units)))
+    yield finding if carried.is_across else replace(finding, means=f"{finding.means}; or {_HELD_BACK}")
+
+
+_HELD_BACK = "a device that keeps the end of each answer until it sends again"
 
 
 def _cycle(seen: BusRecord) -> Iterator[Finding]:

@@ -7,6 +7,9 @@ from dissectors.findings import Rule, Severity
 _OF_DAMAGE = ("MB002", "MB005", "MB007", "MB104", "MB202")
 """What damage that is always the same would otherwise be taken for."""
 
+_OF_LINE = ("LN201", "LN202", "LN203", "LN204")
+"""What octets that are no frame would otherwise be taken for."""
+
 RELAYED = "a relay, or a slow echo, that this tap hears beside the master"
 """What MB018 means of the bus."""
 
@@ -291,10 +294,22 @@ ANSWER_RULES = (
         "mode, software flow control, Telnet, a gateway that translates line ends; the line may be well",
         "read the port raw (binary), without XON/XOFF and line-end translation; does the master have the same trouble",
         explains=(
-            *("MB001", "MB006", "MB009", "MB010", "MB012", "MB015", "MB022", "MB106", "MB207", "MB208"),
-            *("LN003", "LN201", "LN202", "LN203", "LN204"),
+            *("MB001", "MB006", "MB009", "MB010", "MB012", "MB015", "MB022", "MB106", "MB207", "MB208", "LN003"),
+            *_OF_LINE,
             *_OF_DAMAGE,
         ),
+    ),
+    Rule(
+        "MB024",
+        Severity.WARNING,
+        "answers carried over to the next read",
+        "Answers that begin behind one request and end behind another, with a good check when their pieces are put "
+        "together: at least two, and half of all damaged answers. Each check agrees by chance once in 65536.",
+        "the program whose reads these are takes fewer octets than come, and finds the rest at its next read; the line "
+        "may be well",
+        "how many octets it reads, whether others come before the answer (an echo, a preamble), and whether it empties "
+        "its buffer before it asks",
+        explains=("MB003", "MB006", "MB009", "MB010", "MB012", "MB015", "MB207", *_OF_LINE, *_OF_DAMAGE),
     ),
 )
 """In the order of their codes."""

@@ -188,6 +188,23 @@ def as_text(change: Callable[[bytes], bytes], plan: Scenario, seconds: float, ta
     return session, (replace(one, octets=change(one.octets)) if isinstance(one, Chunk) else one for one in items)
 
 
+def reading_too_few(count: int, plan: Scenario, seconds: float, tap: TapModel) -> Heard:
+    """The log of a master that takes `count` octets too few of each answer and finds them at its next read."""
+    session, _ = simulate(plan, seconds, tap)
+
+    def items() -> Iterator[Item]:
+        kept = b""
+        for burst in plan.wire().run(int(seconds * S)):
+            if burst.octets and burst.sent[0].party == "master":
+                yield Chunk(burst.end, burst.octets, burst.marks)
+            elif burst.octets:
+                kept, taken = kept + burst.octets, len(burst.octets) - count
+                yield Chunk(burst.end, kept[:taken])
+                kept = kept[taken:]
+
+    return session, items()
+
+
 def losing(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
     """A computer that loses a read now and then, and says so."""
     session, items = simulate(plan, seconds, tap)

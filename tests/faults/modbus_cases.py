@@ -14,7 +14,16 @@ from sniff.simulation.tap import CH340, FTDI, UART
 from tests.faults.buses import RTU_LINE, modbus
 from tests.faults.case import Case, Said
 from tests.faults.check_cases import Sends
-from tests.faults.hearing import as_text, echoing, hidden_latency, noisy_tap, of_party, sent_otherwise, unheard
+from tests.faults.hearing import (
+    as_text,
+    echoing,
+    hidden_latency,
+    noisy_tap,
+    of_party,
+    reading_too_few,
+    sent_otherwise,
+    unheard,
+)
 from tests.faults.misbehaving import (
     ByTheClock,
     Rewrites,
@@ -234,6 +243,15 @@ MODBUS_CASES: tuple[Case, ...] = (
         (("MB023", "station 2"),),
         never=("MB005", "MB006"),
         seconds=20,
+        seeds=1,
+    ),
+    # a program that takes fewer octets than come
+    Case(
+        "RTU answers read two octets short",
+        _counting(0x0100),
+        (("MB024", "bus"),),
+        hear=partial(reading_too_few, 2),
+        seconds=5,
         seeds=1,
     ),
     # what this tap alone does not hear
