@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from dissectors.findings import Severity
+from dissectors.findings import Finding, Severity, times
+from dissectors.line import NS_PER_S
 from dissectors.profibus.configuration import parse_configuration
 from dissectors.profibus.diagnosis import CONFIGURATION_FAULT, PARAMETER_FAULT
 from dissectors.profibus.rules import RULES
 from dissectors.profibus.slave_watch import SlaveView
+from dissectors.subject import Subject
+from dissectors.words import duration
 
 _OF_BEFORE = ("PB004", "PB005")
 """Of what a slave was given, and kept until it is given something else."""
+
+_FAILED_LEAST = 3
+_UNREADY_LONG = 10 * NS_PER_S
+"""ns in which most devices are through with what they do when they get their parameters."""
 
 
 def codes_of(slave: SlaveView) -> Iterator[str]:
@@ -62,3 +69,19 @@ def diagnosis_grave(code: str, slave: SlaveView) -> Severity:
         "PB009": slave.has_trouble,
     }.get(code, True)
     return RULES[code].severity if still else Severity.NOTE
+
+
+def start_found(who: Subject, slave: SlaveView, words: str) -> Finding | None:
+    """That a slave does not come into data exchange, where nothing else that is found of it says why; `words`: of its
+    newest diagnosis."""
+    told, failed, unready = slave.told, slave.failed, slave.unready
+    if told is None or {*codes_of(slave)} - {"PB009"} or any(map(slave.is_of_another, slave.wanted_by)):
+        return None
+    last = f"; its newest diagnosis: {words or 'nothing to report'}"
+    if failed.count >= _FAILED_LEAST:
+        seen = f"took its parameters {times(failed.count)}, and no data exchange came of it{last}"
+        return failed.found(RULES["PB022"], who, seen)
+    if unready.last - unready.first < _UNREADY_LONG:
+        return None
+    seen = f"is configured and says for {duration(unready.last - unready.first)} that it is not ready{last}"
+    return unready.found(RULES["PB022"], who, seen, Severity.WARNING)

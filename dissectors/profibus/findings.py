@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 from dissectors import busiest
-from dissectors.findings import Finding, Severity, Tally, counted, times
+from dissectors.findings import Finding, Severity, Tally, counted, times, together
 from dissectors.frame import Event, Frame, Header, Role
 from dissectors.last_silence import fallen_silent
 from dissectors.line import NS_PER_S, Timing
 from dissectors.profibus.blame import ONE_STATION, SentOctets
-from dissectors.profibus.diagnosis_findings import codes_of, diagnosis_grave, diagnosis_seen
+from dissectors.profibus.diagnosis_findings import codes_of, diagnosis_grave, diagnosis_seen, start_found
 from dissectors.profibus.finding_words import unheard_words, watchdog_words
 from dissectors.profibus.record import RequestsRecord, joined
 from dissectors.profibus.ring import MasterView, Ring, RingWindow
@@ -28,6 +28,7 @@ _BAD_KEPT = 64  # damaged telegrams whose exchange is not over
 _LEAST = 3
 _SHARE = 0.01
 _SLOW_SHARE = 0.1
+_MOSTLY = 0.5
 _COMMON = 0.5
 _URGENT_MOST = 20
 _LEAST_FRESH = 2
@@ -155,10 +156,8 @@ class ProfibusFindings:
 
     def _of_exchanges(self, who: Subject, record: RequestsRecord) -> Iterator[Finding]:
         silent, total = record.unanswered, record.requests
-        if silent.count and not record.answers and silent.count >= _LEAST:
-            grave = Severity.ERROR if record.fresh >= _LEAST_FRESH and record.silent > record.unheard else Severity.NOTE
-            seen = f"no answer to any of {counted(total, 'request')}{unheard_words(record)}"
-            yield silent.found(RULES["PB001"], who, seen, grave)
+        if not record.answers and silent.count + record.rubbish.count >= _LEAST:
+            yield self._of_silence(who, record)
         elif silent.count and record.answers:
             grave = _grave(record.silent, total, silent, self._span)
             seen = f"{silent.count} of {total} requests without answer"
@@ -180,6 +179,26 @@ class ProfibusFindings:
             allowed = "usual" if limit == self._usual else f"its GSD allows ({milliseconds(limit)})"
             seen = f"{record.slow.count} of {total} answers later than {allowed}; the slowest after {slowest}"
             yield record.slow.found(RULES["PB018"], who, seen)
+
+    def _of_silence(self, who: Subject, record: RequestsRecord) -> Finding:
+        """A station of which no telegram was ever heard."""
+        silent, rubbish = together((record.unanswered, record.rubbish)), record.rubbish.count
+        is_there = record.fresh >= _LEAST_FRESH and silent.count - record.unheard > record.unheard
+        grave = Severity.ERROR if is_there else Severity.NOTE
+        seen = f"no answer to any of {counted(record.requests, 'request')}{unheard_words(record)}"
+        if not rubbish:
+            return silent.found(RULES["PB001"], who, seen, grave)
+        seen += f"; to {rubbish} of them came octets that are no telegram"
+        finding = silent.found(RULES["PB001"], who, seen, grave)
+        of_all = sum(one.rubbish.count for one in self.records.values())
+        if rubbish < max(_LEAST, _MOSTLY * record.requests, _MOSTLY * of_all):
+            return finding
+        return replace(
+            finding,
+            means="something answers at this address: two stations that have it and speak at once, or one with another "
+            "baud rate or parity",
+            next="take off one of the stations that may have this address; the settings of the one that is left",
+        )
 
     def _excused(self, address: int) -> int:
         """How often a slave left data exchange, and that need not be its own fault: it must refuse data then."""
@@ -206,6 +225,8 @@ class ProfibusFindings:
         words = "" if told is None else "; ".join((*told.status_words, *told.block_words))
         for code, tally in sorted(tallies.items()):
             yield tally.found(RULES[code], who, diagnosis_seen(code, slave, words), diagnosis_grave(code, slave))
+        if (unstarted := start_found(who, slave, words)) is not None:
+            yield unstarted
         fallen = self._noted.get((Notice.DROP, address))
         if fallen is not None:
             grave = Severity.ERROR if fallen.count >= _LEAST else Severity.WARNING

@@ -25,9 +25,10 @@ class RequestsRecord:
     """Requests to a station and what became of them.
 
     `repeats`: of all kinds; `worst`: in a row, at most. `repeated`: those of requests that were answered well here.
-    `before`: how the newest ended. `fresh`: requests without answer that are no repeats at once. `exchanged`,
-    `put_off`: requests for data exchange, and refused ones of them. `unheard`: requests without answer after which the
-    master went on as after one: it changed the frame count bit, which it does for no other reason.
+    `before`: how the newest ended. `rubbish`: those in place of whose answer only octets came that are no telegram.
+    `fresh`: requests without any telegram for an answer that are no repeats at once. `exchanged`, `put_off`: requests
+    for data exchange, and refused ones of them. `unheard`: requests without answer after which the master went on as
+    after one: it changed the frame count bit, which it does for no other reason.
     """
 
     requests: int = 0
@@ -35,6 +36,7 @@ class RequestsRecord:
     unanswered: Tally = field(default_factory=Tally)
     repeated: Tally = field(default_factory=Tally)
     damaged: Tally = field(default_factory=Tally)
+    rubbish: Tally = field(default_factory=Tally)
     refused: Tally = field(default_factory=Tally)
     twice: Tally = field(default_factory=Tally)
     slow: Tally = field(default_factory=Tally)
@@ -103,6 +105,9 @@ class RequestsRecord:
             self._miss(closed.request)
         elif verdict is Verdict.DAMAGED_ANSWER:
             self.damaged.add(closed.start, closed.request, closed.response)
+            if closed.response is None:
+                self.rubbish.add(closed.start, closed.request)
+                self.fresh += closed.attempt == 1
         elif verdict is Verdict.EXCEPTION:
             self.refused.add(closed.start, closed.request, closed.response)
             self.put_off += closed.kind == _EXCHANGE

@@ -230,6 +230,19 @@ RULES: dict[str, Rule] = {
             "restart that master; its bus parameters (target rotation time, highest station address)",
             explains=("PB013", "PB019"),
         ),
+        Rule(
+            "PB022",
+            Severity.ERROR,
+            "does not come into data exchange",
+            "A slave took its parameters, three times and more led to no data exchange, with nothing damaged, and "
+            "it is still so; its newest diagnosis names no reason that another finding has (parameters, "
+            "configuration, ident number, another master). A warning where it was configured once and has said for ten "
+            "seconds and more that it is not ready, or has no valid data (static diagnosis).",
+            "the device waits for something of its own (a module, a supply, a setting), or takes other lengths of data "
+            "than the project has",
+            "what the device itself shows; its modules and their lengths in the project; its power and its settings",
+            explains=("PB002", "PB009", "PB017"),
+        ),
     )
 }
 """The catalogue, by code."""

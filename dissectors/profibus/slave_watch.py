@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from dissectors.findings import Tally
 from dissectors.histogram import Histogram
 from dissectors.line import MS
 from dissectors.profibus.control import Status
@@ -12,11 +13,13 @@ from dissectors.profibus.diagnosis import (
     EXTENDED,
     LOCKED,
     NO_MASTER,
+    NOT_READY,
     PARAMETER_FAULT,
+    STATIC,
     Diagnosis,
     parse_diagnosis,
 )
-from dissectors.profibus.parameters import UNLOCK, Parameters, parse_parameters
+from dissectors.profibus.parameters import LOCK, UNLOCK, Parameters, parse_parameters
 from dissectors.profibus.ring import SlaveCounts
 from dissectors.profibus.services import Service
 from dissectors.profibus.slave_state import SlaveState
@@ -36,6 +39,8 @@ class SlaveView:
 
     `drops`: times at which it was found to have left data exchange by itself. `given`: the newest parameters.
     `configured`, `has`: identifiers that it was given, and that it says it has. `told`: its newest diagnosis.
+    `failed`: parameters since its newest exchange of data that led to none until it was given them again, with nothing
+    damaged; `unready`: diagnoses since it was configured that say that it has no data yet.
     """
 
     state: SlaveState | None = None
@@ -69,6 +74,9 @@ class SlaveView:
     diagnoses: int = 0
     faults: int = 0
     was_exchanging: bool = False  # when it fell silent
+    failed: Tally = field(default_factory=Tally)
+    unready: Tally = field(default_factory=Tally)
+    started: tuple[int, int] | None = None  # row and time of the parameters that it has; None after a disturbance
     is_blurred: bool = False  # octets were damaged since it last answered: what its master told it may be lost here
 
     def ask(self, time: int, master: int) -> None:
@@ -134,6 +142,30 @@ class SlaveView:
         _, most = (self.given.watchdogs_ms if self.given is not None else None) or (0, 0)
         return not self.is_blurred and most > 0 and self.silence - doubt >= most * MS
 
+    @property
+    def is_taken(self) -> bool:
+        """Whether its newest parameters make it the master's who gave them."""
+        return self.given is not None and self.given.status & (LOCK | UNLOCK) == LOCK
+
+    def blur(self) -> None:
+        """Octets were damaged: what it was told meanwhile is not known."""
+        self.is_blurred, self.begun, self.started = True, None, None
+
+    def start(self, no: int, time: int) -> None:
+        """It took parameters, asked in a row at a time, ns: it is to exchange data next."""
+        if self.started is not None:
+            self.failed.add(self.started[1], self.started[0])
+        self.started, self.unready = (no, time), Tally()
+
+    def wait(self, no: int, time: int) -> None:
+        """It told a diagnosis, asked in a row at a time, ns."""
+        if self.told is None or self.state is not SlaveState.CONFIGURED:
+            return
+        if self.told.first & NOT_READY or self.told.second & STATIC:
+            self.unready.add(time, no)
+        else:
+            self.unready = Tally()
+
     def become(self, state: SlaveState, time: int) -> None:
         """Take a state."""
         if state is self.state:
@@ -185,6 +217,8 @@ class SlaveView:
         if status is not None and status.refuses:
             return False
         self.exchanges += 1
+        if self.started is not None or self.failed.count:
+            self.started, self.failed, self.unready = None, Tally(), Tally()
         self.urgent = self.urgent + 1 if status is not None and status.is_urgent else 0
         self.become(SlaveState.EXCHANGE, time)
         return False

@@ -171,7 +171,7 @@ class BusWatch:
             if master.clear is not None:
                 master.clear.is_blurred = True
         for slave in self.slaves.values():
-            slave.is_blurred, slave.begun = True, None
+            slave.blur()
 
     def longest_clear(self, master: int) -> int:
         """For how long a master exchanged data in Clear without a break, at most, ns."""
@@ -346,7 +346,10 @@ class BusWatch:
             if self._timing.has_times and slave.is_starved(self._timing.latency):
                 self._tell(Notice.MASTER_SILENT, asked.source, no, frame.start)
         slave.heard(slave.state is SlaveState.EXCHANGE)
-        if service is Service.DIAGNOSIS:
+        if service is Service.SET_PARAMETERS and slave.is_taken:
+            slave.start(no, frame.start)
+        elif service is Service.DIAGNOSIS:
+            slave.wait(no, frame.start)
             self._tell(Notice.DIAGNOSIS, asked.destination, no, frame.start)
             if asked.source in slave.wanted_by and slave.is_of_another(asked.source):
                 self._tell(Notice.LOCKED, asked.destination, no, frame.start)

@@ -19,7 +19,7 @@ from sniff.simulation.tap import FTDI
 from sniff.simulation.wire import Party
 from tests.faults.buses import MS, Change
 from tests.faults.case import Case, Said
-from tests.faults.profibus_stations import KeepsToken, Off, from_the_middle
+from tests.faults.profibus_stations import KeepsToken, NeverReady, Off, from_the_middle
 from tests.faults.stations import Dies, Wrapped
 
 LINE = LineSettings.parse("187500,8E1")
@@ -245,6 +245,22 @@ PROFIBUS_CASES: tuple[Case, ...] = (
         "PROFIBUS wrong ident",
         partial(profibus, slave=partial(Slave, 6, LINE, ident=0x80AA)),
         (("PB006", "station 6"),),
+        seeds=1,
+    ),
+    Case(
+        "PROFIBUS slave is never ready",
+        partial(profibus, slave=partial(NeverReady, 6, LINE)),
+        (("PB022", "station 6"),),
+        never=("PB001", "PB004", "PB005", "PB007"),
+        seconds=10,
+        seeds=1,
+    ),
+    Case(
+        "PROFIBUS two slaves of one address at once",
+        partial(profibus, also={"twin": partial(Slave, 6, LINE, ident=0x80AA, tsdr=64)}),
+        (Said(("station 6",), words="at once", own_words=True),),
+        never=("PB002", "PB022"),
+        seconds=10,
         seeds=1,
     ),
     Case(

@@ -6,7 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from dissectors.frame import Chunk
+from dissectors.profibus.diagnosis import NOT_READY
 from dissectors.profibus.simulated_master import Job
+from dissectors.profibus.simulated_slave import Slave
 from dissectors.profibus.telegram import parse, telegram, token
 from dissectors.simulated import Send, Station
 from sniff.engine.session import Item
@@ -72,6 +74,14 @@ class Off(Wrapped):
     def next_wake(self) -> int | None:
         due = super().next_wake()
         return None if due is None or due >= self.at else due
+
+
+class NeverReady(Slave):
+    """A slave that takes all it is given and waits for something of its own."""
+
+    def _diagnosis(self, asker: int | None, now: int) -> bytes:
+        first, *rest = super()._diagnosis(asker, now)
+        return bytes((first | NOT_READY, *rest))
 
 
 class KeepsToken(Wrapped):
