@@ -1,8 +1,8 @@
 """Headers of many good telegrams at once, as `peek` gives each.
 
 Role, kind, function, access point and refusal depend on a few octets at the begin of a telegram: the same are asked
-once. Telegrams with unusual address extensions, and those whose data tell the service (connections of DP-V1), are
-asked one by one, the same octets once.
+once. Telegrams with unusual address extensions, and those whose data tell the service (connections of DP-V1, programs
+of S7 controllers), are asked one by one, the same octets once.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from dissectors.columns import NONE, ROLES
 from dissectors.frame import Check, FoundBy, Frame, Role
+from dissectors.profibus import s7
 from dissectors.profibus.control import Control
 from dissectors.profibus.header import peek
 from dissectors.profibus.telegram import FIXED, HIGHEST, SC, SD2, SD4
@@ -106,7 +107,8 @@ def _frame(whole: bytes) -> Frame:
 @dataclass(frozen=True, slots=True)
 class _Heads:
     """The begins of telegrams. `to`, `by`, `control`: octets of checked ones, else 0. `first`, `second`: address
-    extensions, in their order. `count`: octets of data; NONE without a frame control octet."""
+    extensions, in their order. `count`: octets of data; NONE without a frame control octet. `program`: whether they may
+    be of an S7 controller."""
 
     start: Times
     checked: Masks
@@ -118,6 +120,7 @@ class _Heads:
     source: Times
     destination: Times
     count: Times
+    program: Masks
 
     @classmethod
     def of(cls, octets: Octets, offset: Times, length: Times) -> _Heads:
@@ -135,7 +138,12 @@ class _Heads:
             for bare, one in zip(address, (to, by), strict=True)
         )
         size = length - np.where(long, 6, 3) - 3 - (to >> 7) - (by >> 7)
-        return cls(start, checked, to, by, control, first, second, source, destination, np.where(checked, size, NONE))
+        count, data = np.where(checked, size, NONE), body + 3
+        told = [octets.take(data + at, mode="clip") for at in range(4)]
+        program = (
+            (count >= s7.LEAST) & (told[0] == s7.ID) & np.isin(told[1], [*s7.KINDS]) & (told[2] == 0) & (told[3] == 0)
+        )
+        return cls(start, checked, to, by, control, first, second, source, destination, count, program)
 
     def keys(self) -> tuple[Times, Masks]:
         """A number for all that role, kind, function, access point and refusal depend on, and where it says all."""
@@ -143,7 +151,7 @@ class _Heads:
         dsap = np.where(has_to, self.first + 1, 0)
         ssap = np.where(has_by, np.where(has_to, self.second, self.first) + 1, 0)
         slave = np.where(_REQUEST[self.control], dsap, ssap)
-        plain = (dsap <= _PLAIN) & (ssap <= _PLAIN) & ((slave == 0) | (slave > _FIRST_SERVICE))
+        plain = (dsap <= _PLAIN) & (ssap <= _PLAIN) & ((slave == 0) | (slave > _FIRST_SERVICE)) & ~self.program
         key = np.where(self.checked, 0, np.where(self.start == SC, 1, 2))
         for part, size in (
             (self.control, 256),

@@ -6,6 +6,7 @@ from enum import Enum
 
 from dissectors.profibus.control import FDL_STATUS
 from dissectors.profibus.dpv1 import parse_acyclic
+from dissectors.profibus.s7 import program_of
 from dissectors.profibus.telegram import Telegram
 
 MASTER_SAP = 62
@@ -34,6 +35,7 @@ class Service(Enum):
     TOKEN = "token"
     SHORT_ACKNOWLEDGE = "short-acknowledge"
     ACKNOWLEDGE = "acknowledge"  # an answer without data and without access points
+    PROGRAM = "s7"  # no DP: programs of S7 controllers, on PPI and MPI
     OTHER = "fdl-data"
 
     @property
@@ -62,6 +64,7 @@ _TITLES = {
     Service.TOKEN: "token",
     Service.SHORT_ACKNOWLEDGE: "short acknowledgement",
     Service.ACKNOWLEDGE: "acknowledgement",
+    Service.PROGRAM: "S7",
     Service.OTHER: "FDL data",
 }
 
@@ -86,7 +89,8 @@ ACYCLIC = frozenset((Service.ALARM, Service.SERVER, Service.RESOURCE_MANAGER, Se
 _LAST_CONNECTION = 48
 """Access points 0 … 48 of a slave are for connections of masters of class 2, the resource manager gives them out."""
 
-_SRD = (0xC, 0xD)
+_SRD_HIGH = 0xD
+"""How a master of class 1 asks for data exchange; who asks with low priority does something else."""
 
 
 def service_of(telegram: Telegram) -> Service:
@@ -103,13 +107,19 @@ def service_of(telegram: Telegram) -> Service:
     point = slave_sap(telegram)
     if point is not None:
         if point <= _LAST_CONNECTION:
-            return Service.CONNECTION if parse_acyclic(telegram.data, control.is_request) else Service.OTHER
+            return Service.CONNECTION if parse_acyclic(telegram.data, control.is_request) else _other(telegram)
         return _BY_SAP.get(point, Service.OTHER)
     if telegram.dsap is not None or telegram.ssap is not None:
         return Service.OTHER
+    if program_of(telegram) is not None:
+        return Service.PROGRAM
     if control.is_request:
-        return Service.DATA_EXCHANGE if control.code in _SRD else Service.OTHER
+        return Service.DATA_EXCHANGE if control.code == _SRD_HIGH else Service.OTHER
     return Service.DATA_EXCHANGE if telegram.data or control.code >= 8 else Service.ACKNOWLEDGE
+
+
+def _other(telegram: Telegram) -> Service:
+    return Service.OTHER if program_of(telegram) is None else Service.PROGRAM
 
 
 def slave_sap(telegram: Telegram) -> int | None:

@@ -13,6 +13,7 @@ from dissectors.profibus.diagnosis import NO_MASTER, parse_diagnosis
 from dissectors.profibus.dpv1 import parse_acyclic
 from dissectors.profibus.header import damage_of, meant, refusal_words
 from dissectors.profibus.parameters import parse_global_control, parse_new_address, parse_parameters
+from dissectors.profibus.s7 import program_of
 from dissectors.profibus.services import ACYCLIC, Service, service_of
 from dissectors.profibus.telegram import BROADCAST, Telegram, body_of, parse
 
@@ -65,6 +66,8 @@ def content(telegram: Telegram) -> str:
     said = told(telegram.data) if told is not None else ""
     if service in ACYCLIC and (pdu := parse_acyclic(telegram.data, control.is_request)) is not None:
         said = pdu.words
+    if (program := program_of(telegram)) is not None and service is Service.PROGRAM:
+        said = f"{program.words}: {telegram.data.hex(' ')}"
     if service is Service.OTHER:
         points = "" if telegram.dsap is None and telegram.ssap is None else f" SAP {telegram.ssap} → {telegram.dsap}"
         return f"{control.words}{points}" + (f" {telegram.data.hex(' ')}" if telegram.data else "")

@@ -51,7 +51,10 @@ def bus(dice: random.Random, count: int) -> list[bytes]:
 
 
 def _exchange(dice: random.Random, master: int) -> list[bytes]:
-    slave, data = dice.randint(8, 12), dice.randbytes(dice.randint(0, 12))
+    slave, data = (
+        dice.randint(8, 12),
+        dice.choice((b"", b"\x32\1\0\0\0\1\0\2\0\0")) + dice.randbytes(dice.randint(0, 12)),
+    )
     points = dice.choice(((None, None), (None, None), (60, 62), (61, 62), (51, 50), (12, 50), (0x41, 62), (None, 62)))
     control = dice.choice((0x5D, 0x7D, 0x6C, 0x49, 0x46, 0x43))
     asked = telegram(slave, master, control, data, *points)
