@@ -141,6 +141,7 @@ class BulkBusWatch(BusWatch):
                 _serve(slave, times[begin:end][source[begin:end] == slave.owner])
             slave.heard(True)
             slave.exchanges += end - begin
+            slave.serve()
             slave.urgent = _trailing(urgent[begin:end], slave.urgent) if any_urgent else 0
             slave.unanswered = slave.run = 0
         histograms = {address: self.slaves[address].cycle for address in slave_of[begins].tolist()}

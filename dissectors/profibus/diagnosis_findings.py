@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from dissectors.findings import Finding, Severity, times
+from dissectors.findings import Finding, Severity, counted, times
 from dissectors.line import NS_PER_S
 from dissectors.profibus.configuration import parse_configuration
 from dissectors.profibus.diagnosis import CONFIGURATION_FAULT, PARAMETER_FAULT
@@ -79,9 +79,20 @@ def start_found(who: Subject, slave: SlaveView, words: str) -> Finding | None:
         return None
     last = f"; its newest diagnosis: {words or 'nothing to report'}"
     if failed.count >= _FAILED_LEAST:
-        seen = f"took its parameters {times(failed.count)}, and no data exchange came of it{last}"
+        came = "no data exchange came of it" if slave.single is None else _single(slave, slave.single)
+        seen = f"took its parameters {times(failed.count)}, and {came}{last}"
         return failed.found(RULES["PB022"], who, seen)
     if unready.last - unready.first < _UNREADY_LONG:
         return None
     seen = f"is configured and says for {duration(unready.last - unready.first)} that it is not ready{last}"
     return unready.found(RULES["PB022"], who, seen, Severity.WARNING)
+
+
+def _single(slave: SlaveView, octets: int) -> str:
+    """That its master takes no second answer; and how long that one is, where it is not as long as configured."""
+    modules = parse_configuration(slave.configured)
+    configured = sum(module.inputs for module in modules)
+    begins = "its master began anew after the first answer with data"
+    if not modules or modules[-1].end < len(slave.configured) or octets == configured:
+        return begins
+    return f"{begins}: that has {counted(octets, 'octet')}, {configured} are configured"

@@ -234,10 +234,10 @@ RULES: dict[str, Rule] = {
             "PB022",
             Severity.ERROR,
             "does not come into data exchange",
-            "A slave took its parameters, three times and more led to no data exchange, with nothing damaged, and "
-            "it is still so; its newest diagnosis names no reason that another finding has (parameters, "
-            "configuration, ident number, another master). A warning where it was configured once and has said for ten "
-            "seconds and more that it is not ready, or has no valid data (static diagnosis).",
+            "A slave took its parameters, three times and more led to no data exchange, or to a single answer, with "
+            "nothing damaged, and it is still so; its newest diagnosis names no reason that another finding has "
+            "(parameters, configuration, ident number, another master). A warning where it was configured once and has "
+            "said for ten seconds and more that it is not ready, or has no valid data (static diagnosis).",
             "the device waits for something of its own (a module, a supply, a setting), or takes other lengths of data "
             "than the project has",
             "what the device itself shows; its modules and their lengths in the project; its power and its settings",

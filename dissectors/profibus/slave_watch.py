@@ -39,8 +39,9 @@ class SlaveView:
 
     `drops`: times at which it was found to have left data exchange by itself. `given`: the newest parameters.
     `configured`, `has`: identifiers that it was given, and that it says it has. `told`: its newest diagnosis.
-    `failed`: parameters since its newest exchange of data that led to none until it was given them again, with nothing
-    damaged; `unready`: diagnoses since it was configured that say that it has no data yet.
+    `failed`: parameters in a row that led to one exchange of data at most until it was given them again, with nothing
+    damaged; `unready`: diagnoses since it was configured that say that it has no data yet. `single`: octets
+    in its answer to the only exchange of data since it was given any.
     """
 
     state: SlaveState | None = None
@@ -77,6 +78,8 @@ class SlaveView:
     failed: Tally = field(default_factory=Tally)
     unready: Tally = field(default_factory=Tally)
     started: tuple[int, int] | None = None  # row and time of the parameters that it has; None after a disturbance
+    before: int = 0  # exchanges of data until it was given them
+    single: int | None = None
     is_blurred: bool = False  # octets were damaged since it last answered: what its master told it may be lost here
 
     def ask(self, time: int, master: int) -> None:
@@ -155,7 +158,15 @@ class SlaveView:
         """It took parameters, asked in a row at a time, ns: it is to exchange data next."""
         if self.started is not None:
             self.failed.add(self.started[1], self.started[0])
-        self.started, self.unready = (no, time), Tally()
+        self.started, self.before, self.unready = (no, time), self.exchanges, Tally()
+
+    def serve(self) -> None:
+        """It exchanged data: its start came to something where its master goes on after the first answer."""
+        if self.exchanges - self.before <= 1:
+            return
+        self.single = None
+        if self.started is not None or self.failed.count:
+            self.started, self.failed, self.unready = None, Tally(), Tally()
 
     def wait(self, no: int, time: int) -> None:
         """It told a diagnosis, asked in a row at a time, ns."""
@@ -188,7 +199,7 @@ class SlaveView:
         status = None if answer.control is None else answer.control.status
         self.rejects += status is not None and status.refuses
         if service is Service.DATA_EXCHANGE:
-            return self._exchanged(status, time)
+            return self._exchanged(status, len(answer.data), time)
         if status is not None and status.refuses:
             return False
         if service is Service.DIAGNOSIS:
@@ -208,7 +219,7 @@ class SlaveView:
             self.has = answer.data
         return False
 
-    def _exchanged(self, status: Status | None, time: int) -> bool:
+    def _exchanged(self, status: Status | None, octets: int, time: int) -> bool:
         if status is Status.NOT_ACTIVATED:
             fell = self.state is SlaveState.EXCHANGE and not self.unlocked
             self.drops += fell
@@ -216,9 +227,8 @@ class SlaveView:
             return fell
         if status is not None and status.refuses:
             return False
-        self.exchanges += 1
-        if self.started is not None or self.failed.count:
-            self.started, self.failed, self.unready = None, Tally(), Tally()
+        self.exchanges, self.single = self.exchanges + 1, octets
+        self.serve()
         self.urgent = self.urgent + 1 if status is not None and status.is_urgent else 0
         self.become(SlaveState.EXCHANGE, time)
         return False

@@ -26,6 +26,14 @@ def test_starts_that_come_to_nothing_are_told(start: Telegrams) -> None:
     assert (told.subject, told.severity, told.count) == ("station 5", Severity.ERROR, 3)
 
 
+@pytest.mark.parametrize(("octets", "words"), [(5, "has 5 octets, 32 are configured"), (32, "first answer with data;")])
+def test_whose_first_answer_is_not_taken_is_told(octets: int, words: str) -> None:
+    once = [(1, telegram(5, 1, 0x7D, b"\0")), (1, telegram(1, 5, 0x08, bytes(octets)))]
+    told = found(judged([*GIVEN, *READY, *once] * 4), "PB022")
+    assert told is not None
+    assert words in told.seen
+
+
 @pytest.mark.parametrize(("says", "turns", "is_told"), [(UNREADY, 120, True), (STATIC, 120, True), (READY, 120, False)])
 def test_who_is_not_ready_for_long_is_told(says: Telegrams, turns: int, is_told: bool) -> None:
     told = found(judged([*GIVEN, *[(silence * 50, octets) for silence, octets in says] * turns]), "PB022")
