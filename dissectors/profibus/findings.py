@@ -162,7 +162,9 @@ class ProfibusFindings:
             grave = _grave(record.silent, total, silent, self._span)
             seen = f"{silent.count} of {total} requests without answer"
             seen += busiest.words(silent.quarters, silent.count, total, self._span) + unheard_words(record)
-            yield fallen_silent(silent.found(RULES["PB002"], who, seen, grave), record.silence, self.watch.ring().last)
+            finding = silent.found(RULES["PB002"], who, seen, grave)
+            finding = _answered_again(finding, record) if record.answers_repeats else finding
+            yield fallen_silent(finding, record.silence, self.watch.ring().last)
         if record.twice.count:
             often = record.twice.count >= _LEAST and record.twice.count >= _SHARE * total
             grave = Severity.ERROR if often else Severity.NOTE
@@ -208,8 +210,9 @@ class ProfibusFindings:
     def _of_repeats(self) -> Iterator[Finding]:
         """Repeats of what was answered well here: of one station's requests, or of the bus where most stations' are."""
         known = {address: one for address, one in self.records.items() if one.answers >= _LEAST}
-        told = {address: one for address, one in known.items() if one.repeated.count}
-        grave = [one for one in told.values() if _grave(one.repeated.count, one.requests) >= Severity.WARNING]
+        told, span = {address: one for address, one in known.items() if one.repeated.count}, self._span
+        graves = {at: _grave(one.repeated.count, one.requests, one.repeated, span) for at, one in told.items()}
+        grave = [one for one in graves.values() if one >= Severity.WARNING]
         if len(grave) > 1 and len(grave) >= _COMMON * len(known):
             together = joined([one.repeated for one in told.values()])
             total = sum(one.requests for one in known.values())
@@ -218,7 +221,8 @@ class ProfibusFindings:
             return
         for address, one in sorted(told.items()):
             seen = f"{one.repeated.count} of {one.requests} requests are sent again although they were answered here"
-            yield one.repeated.found(RULES["PB003"], station(address), seen, _grave(one.repeated.count, one.requests))
+            seen += busiest.words(one.repeated.quarters, one.repeated.count, one.requests, span)
+            yield one.repeated.found(RULES["PB003"], station(address), seen, graves[address])
 
     def _of_diagnosis(self, address: int, slave: SlaveView) -> Iterator[Finding]:
         who, told, tallies = station(address), slave.told, self._diagnosed.get(address, {})
@@ -296,10 +300,9 @@ class ProfibusFindings:
                 seen = f"station {address} made a token of its own {times(tally.count)}"
                 yield tally.found(RULES["PB013"], BUS, seen + self._held_seen() + self._woken_seen())
             elif what is Notice.TOKEN_AGAIN:
-                seen, grave = (
-                    f"the token to it was sent again {times(tally.count)}",
-                    _grave(tally.count, self._passed[address]),
-                )
+                seen = f"the token to it was sent again {times(tally.count)}"
+                seen += busiest.words(tally.quarters, tally.count, self._passed[address], self._span)
+                grave = _grave(tally.count, self._passed[address], tally, self._span)
                 if not self._told[address]:
                     seen, grave = f"{seen}; nothing that it sends was heard by this tap", Severity.NOTE
                 yield tally.found(RULES["PB014"], station(address), seen, grave)
@@ -370,6 +373,18 @@ def _grave(count: int, total: int, when: Tally | None = None, span: int = 0) -> 
     many = count >= _LEAST and count >= _SHARE * total
     is_fault = when is not None and busiest.is_fault(when.quarters, total, span)
     return Severity.WARNING if many or is_fault else Severity.NOTE
+
+
+def _answered_again(finding: Finding, record: RequestsRecord) -> Finding:
+    """What is found of requests without answer, where each is answered when it is sent again."""
+    return replace(
+        finding,
+        seen=f"{finding.seen}; {record.again} were answered when they were sent again",
+        means="its answers come later than its master waits (slot time), which takes them for answers to the repeat; "
+        "or it misses each first request",
+        next="the slot time of the project against the delay of the station (MaxTsdr in its GSD) and of repeaters, "
+        "converters and optical links on the way",
+    )
 
 
 def _of_polls(tally: Tally, address: int, seen: str, view: MasterView) -> Finding:

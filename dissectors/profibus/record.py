@@ -19,6 +19,9 @@ _EXCHANGE = Service.DATA_EXCHANGE.value
 _WELL = frozenset((Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION))
 _LISTENED = frozenset((Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION, Verdict.DAMAGED_ANSWER, Verdict.LATE))
 
+_REPEATS_LEAST, _REPEATS = 10, 0.9
+"""So many requests, and of all of them, that are answered only when they are sent again."""
+
 
 @dataclass(slots=True)
 class RequestsRecord:
@@ -26,9 +29,10 @@ class RequestsRecord:
 
     `repeats`: of all kinds; `worst`: in a row, at most. `repeated`: those of requests that were answered well here.
     `before`: how the newest ended. `rubbish`: those in place of whose answer only octets came that are no telegram.
-    `fresh`: requests without any telegram for an answer that are no repeats at once. `exchanged`, `put_off`: requests
-    for data exchange, and refused ones of them. `unheard`: requests without answer after which the master went on as
-    after one: it changed the frame count bit, which it does for no other reason.
+    `fresh`: requests without any telegram for an answer that are no repeats at once; `again`: repeats of requests
+    without answer that were answered well. `exchanged`, `put_off`: requests for data exchange, and refused ones of
+    them. `unheard`: requests without answer after which the master went on as after one: it changed the frame count
+    bit, which it does for no other reason.
     """
 
     requests: int = 0
@@ -46,6 +50,7 @@ class RequestsRecord:
     worst: int = 0
     before: Verdict | None = None
     fresh: int = 0
+    again: int = 0
     exchanged: int = 0
     put_off: int = 0
     unheard: int = 0
@@ -73,6 +78,11 @@ class RequestsRecord:
         """Requests without answer that the master may not have had an answer to, either."""
         return self.unanswered.count - self.unheard
 
+    @property
+    def answers_repeats(self) -> bool:
+        """Whether nearly every request is answered only when it is sent again, which chance does not do."""
+        return self.again >= max(_REPEATS_LEAST, _REPEATS * (self.requests - self.repeats))
+
     def see_damaged(self, no: int, answer: Frame) -> None:
         """Take a damaged answer, in that row."""
         self.checks.see(no, answer.end, ways(answer))
@@ -93,6 +103,7 @@ class RequestsRecord:
         if closed.attempt > 1:
             self.repeats += 1
             self.worst = max(self.worst, closed.attempt - 1)
+            self.again += self.before is Verdict.NO_RESPONSE and verdict is Verdict.RETRY
             if self.before in _WELL:
                 self.repeated.add(closed.start, closed.request)
         self.before = verdict

@@ -69,6 +69,30 @@ def test_rubbish_in_the_place_of_an_answer_shows_no_station() -> None:
     assert found(judge, "PB002") is None
 
 
+def test_who_answers_each_repeat_is_asked_too_soon() -> None:
+    """The slot time is shorter than the way to it; lost requests are not so regular."""
+    late = [one for at in range(12) for one in (exchange(at % 2)[0], *exchange(at % 2))]
+    told = found(judged([*exchanges(1), *late]), "PB002")
+    assert told is not None
+    assert "slot time" in told.means
+    lossy = [one for at in range(40) for one in (*exchange(at % 2)[: 1 + at % 2], *exchange(at % 2)[at % 2 * 2 :])]
+    told = found(judged(lossy), "PB002")
+    assert told is not None
+    assert "slot time" not in told.means
+
+
+def test_repeats_of_a_quarter_of_an_hour_are_no_chance_of_the_night() -> None:
+    judge = judged([*exchanges(3), *exchange(1, wait=8 * 3_600_000)])
+    record = judge.records[5]
+    record.requests, record.answers = 30_000, 30_000
+    for at in range(60):
+        record.repeated.add(10**12 + at * 10**10)
+    told = found(judge, "PB003")
+    assert told is not None
+    assert told.severity is Severity.WARNING
+    assert "within a quarter of an hour" in told.seen
+
+
 def test_counts_as_bus_monitors_have_them() -> None:
     lost = [(1, telegram(5, 1, 0x5D, b"\0"))] * 2 + [(1, telegram(5, 1, 0x6D, dsap=60, ssap=62))]
     spoilt = bytearray(telegram(1, 5, 0x08, b"\7"))
