@@ -6,14 +6,18 @@ import heapq
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from itertools import groupby, repeat
+from itertools import groupby
 from typing import TYPE_CHECKING
 
+from dissectors.line import NS_PER_S
 from sniff.engine.capture import Capture, CaptureError
-from sniff.engine.session import Item, LineEvent, Session
+from sniff.engine.session import Item, LineEvent, LineEventKind, Session
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
+
+APART = NS_PER_S
+"""Captures between which more time lies, ns, did not hear what was meanwhile: no frame is in both of them then."""
 
 
 def merged_session(captures: Sequence[Capture], names: Sequence[str]) -> Session:
@@ -61,17 +65,30 @@ class Merged:
 def merged(captures: Sequence[Capture], shared: Callable[[Item], None] | None = None) -> Iterator[Item]:
     """The items of all in order of time; what several captures have, the same at the same time, once.
 
-    `shared` is called for each item that is left out because another capture has given it.
+    Where one ends, and the next begins a while later, nobody listened: an event says so. `shared` is called for each
+    item that is left out because another capture has given it.
     """
-    sources = [zip(repeat(number), capture.items(), strict=False) for number, capture in enumerate(captures)]
-    in_order = heapq.merge(*sources, key=lambda found: found[1].time)
-    for _, at_once in groupby(in_order, key=lambda found: found[1].time):
+    listening: set[int] = set()
+    last: int | None = None
+    in_order = heapq.merge(*(_given(*one, listening) for one in enumerate(captures)), key=lambda found: found[1].time)
+    for time, at_once in groupby(in_order, key=lambda found: found[1].time):
+        if last is not None and time - last > APART and not listening:
+            yield LineEvent(time, LineEventKind.OMITTED, f"{(time - last) / NS_PER_S:.1f} s in none of the captures")
+        last = time
         seen: Counter[tuple[int, Item]] = Counter()  # by source
         given: Counter[Item] = Counter()
         for number, item in at_once:
+            listening.add(number)
             seen[number, item] += 1
             if seen[number, item] > given[item]:
                 given[item] += 1
                 yield item
             elif shared is not None:
                 shared(item)
+
+
+def _given(number: int, capture: Capture, listening: set[int]) -> Iterator[tuple[int, Item]]:
+    """What a capture gives, beside its number, which is taken out of `listening` at its end."""
+    for item in capture.items():
+        yield number, item
+    listening.discard(number)

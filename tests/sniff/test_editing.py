@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -156,6 +157,28 @@ def test_what_two_captures_share_is_merged_once() -> None:
     assert [(item.time - start) // 1_000_000 for item in merged([first, second])] == [0, 0, 5, 5, 10, 10, 15]
     assert octets(list(merged([first, second]))) == b"\1\1\2\3\4\1"
     assert list(merged([first, first, first])) == list(first.items())
+
+
+@pytest.mark.parametrize(
+    ("times", "holes"),
+    [
+        ([(0, 9000)], []),
+        ([(0, 9000), (4000, 4500)], []),
+        ([(8000,), (0, 3000)], [8000]),
+        ([(500,), (0,)], []),
+        ([(0,), (2000, 9000), (19000, 19500)], [2000, 19000]),
+    ],
+    ids=["within one", "one goes on", "apart", "one after the other", "twice"],
+)
+def test_between_captures_nobody_listened(times: list[tuple[int, ...]], holes: list[int]) -> None:
+    head = "# line: 19200,8E1\n# start: 2026-03-01T10:00:00Z\n"
+    captures = [
+        parse(head + "".join(f"+{time - before} 01\n" for before, time in pairwise((0, *one)))) for one in times
+    ]
+    events = [item for item in merged(captures) if isinstance(item, LineEvent)]
+    start = captures[0].session.started
+    assert [(item.time - start) // 1_000_000 for item in events] == holes
+    assert all(item.kind.is_hole for item in events)
 
 
 def test_cut_by_frames_gives_these_frames(tmp_path: Path, sniff485: Callable[..., tuple[int, str, str]]) -> None:
