@@ -20,8 +20,8 @@ class FeedStatus:
     `priority`: what the system allowed the capture process, in words ("real-time", "normal"), empty when unknown.
     `trouble`: why nothing is written any more although the capture goes on ("no space left on the disk …").
     `behind`: seconds by which the disk is late with the recording, 0 while it keeps up.
-    `reading`: whether the file is still being read, `read`: how much of it has been, 0 … 1. `judged`: how many of its
-    rows the rules have seen, 0 … 1.
+    `reading`: whether the file is still being read, `read`: how much of it has been, 0 … 1, or None where that was
+    all, and rows of it are still to come. `judged`: how many of its rows the rules have seen, 0 … 1.
     `follows`: the recording that rows are read from while another process writes it; "": they are from a port.
     `searching`: with which settings a search listens at the moment, empty when there is none.
     `second`: a second protocol on the bus, by its registry name, where the whole file was read; `foreign`: how many
@@ -41,7 +41,7 @@ class FeedStatus:
     trouble: str = ""
     behind: float = 0.0
     reading: bool = False
-    read: float = 1.0
+    read: float | None = 1.0
     judged: float = 1.0
     follows: str = ""
     second: str = ""

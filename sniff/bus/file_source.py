@@ -230,7 +230,7 @@ class FileFeed:
             second=self._second[0],
             foreign=self._second[1],
             since=self._foreign.since,
-            read=min(0.99, self._progress.octets / max(1, self._size)) if self._reading else 1.0,
+            read=self._progress.share(self._size) if self._reading else 1.0,
             judged=1.0 if store.all_judged and not self._reading else min(0.99, store.judged / max(1, store.last_no)),
         )
 
@@ -253,7 +253,7 @@ class FileFeed:
 
 
 class Progress:
-    """How far the files of a capture have been read. `octets`: of all of them."""
+    """How far the files of a capture have been read."""
 
     def __init__(self) -> None:
         self._before = 0
@@ -261,15 +261,16 @@ class Progress:
 
     def see(self, stream: FileIO) -> None:
         """The next file is opened."""
-        self._before, self._stream = self.octets, stream
+        self._before += 0 if self._stream is None else _size(self._stream.name)
+        self._stream = stream
 
-    @property
-    def octets(self) -> int:
-        """Read so far."""
-        if self._stream is not None:
-            with contextlib.suppress(ValueError, OSError):  # closed by now: as far as it was looked at
-                self._seen = self._before + self._stream.tell()
-        return getattr(self, "_seen", 0)
+    def share(self, size: int) -> float | None:
+        """Of files of `size` octets, 0 … 1; None at the end of the last of them: what is left is in memory."""
+        try:
+            seen = self._before + (0 if self._stream is None else self._stream.tell())
+        except (ValueError, OSError):  # closed by now
+            return None
+        return seen / size if seen < size else None
 
 
 def _size(file: Any) -> int:

@@ -76,7 +76,7 @@ def state_words(status: FeedStatus) -> str:
 def progress_of(status: FeedStatus) -> str:
     """How far a file has been read, then how far its rows have been judged; empty when all is done."""
     if status.reading:
-        return f"{int(status.read * 100)} % read"
+        return "reading" if status.read is None else f"{int(status.read * 100)} % read"
     return f"{int(status.judged * 100)} % judged" if status.judged < 1 else ""
 
 
