@@ -23,6 +23,9 @@ MOST_AT_ONCE = 100_000
 ON_ITS_WAY = NS_PER_S
 """ns that what was heard may take until it is counted."""
 
+LEAST_HEARD = 0.1
+"""Of a stretch of time of which nobody heard more than that, a chart shows no load."""
+
 KEPT_SECONDS = 86_400
 """Seconds that are known one by one; a day of them takes some 20 MB."""
 
@@ -175,6 +178,12 @@ class Load:
     def share_of(self, part: Second, start: int, end: int) -> float:
         """Bus load, 0 … 1, of a stretch (ns) whose seconds together are `part`; only what the capture covers counts."""
         return min(1.0, part.busy / max(self.heard_of(start, end), self.line.char))
+
+    def drawn(self, busy: int, start: int, end: int) -> float | None:
+        """What a chart shows of a stretch in which the line was busy for so long (all ns), 0 … 1: of its whole time but
+        what nobody heard; None where that is nearly all."""
+        heard = end - start - self.holes.within(start, end)
+        return min(1.0, busy / heard) if heard > LEAST_HEARD * (end - start) else None
 
     def heard_of(self, start: int, end: int) -> int:
         """How much of a stretch (ns) the capture covers, from the first octet to the last without its holes, ns."""

@@ -16,6 +16,7 @@ from dissectors.words import milliseconds
 from sniff.analysis.health import Health
 from sniff.analysis.json_text import iso
 from sniff.analysis.judging import rules_over
+from sniff.analysis.load import Load
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary, ranked
 from sniff.analysis.trends import Trend, Trends
@@ -43,7 +44,7 @@ from sniff.reporting.numbers import (
     ValueTrend,
     seconds_since,
 )
-from sniff.reporting.timeline import Timeline
+from sniff.reporting.timeline import MOST_PARTS, Timeline
 
 EVIDENCE_SHOWN, EVIDENCE_OF_NOTES = 5, 2
 LONGEST_TEXT = 180
@@ -112,7 +113,7 @@ def collect(
         line_errors=ranked(summary.marks),
         response=Distribution.of(summary.latency),
         part=timeline.width / 1e9 if timeline.origin is not None else 0.0,
-        timeline=_parts(timeline, session),
+        timeline=_parts(timeline, load, session),
         happenings=tuple(told.happenings),
         measurement=_measurement(session, dissector),
         ring=None if dissector.ring is None else _ring(dissector.ring, model.ring()),
@@ -189,15 +190,16 @@ def _score(health: Health) -> Score:
     return Score(health.score, health.reasons)
 
 
-def _parts(timeline: Timeline, session: Session) -> tuple[TimePart, ...]:
+def _parts(timeline: Timeline, load: Load, session: Session) -> tuple[TimePart, ...]:
     if timeline.origin is None:
         return ()
     begin = (timeline.origin - session.started) / NS_PER_S  # parts begin at round times, the first before the start
     width = timeline.width / 1e9
+    edges = range(timeline.origin, timeline.origin + MOST_PARTS * timeline.width + 1, timeline.width)
     return tuple(
         TimePart(
             begin + number * width,
-            min(1.0, part.busy / timeline.width),
+            load.drawn(part.busy, edges[number], edges[number + 1]),
             part.damaged,
             part.noise,
             part.failed,

@@ -106,10 +106,10 @@ class StationNumbers:
 
 @dataclass(frozen=True, slots=True)
 class TimePart:
-    """One part of the time: bus load and counts of trouble; `noise` is octets."""
+    """One part of the time: bus load, None where nobody heard it, and counts of trouble; `noise` is octets."""
 
     at: float
-    load: float
+    load: float | None
     damaged: int
     noise: int
     failed: int

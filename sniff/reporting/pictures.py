@@ -6,6 +6,7 @@ import io
 import math
 import re
 from collections.abc import Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from sniff.analysis.wording import station_word
@@ -78,9 +79,11 @@ def _timeline(parts: Sequence[TimePart], width: float) -> Figure:
     unit, name = _time_unit(parts[-1].at)
     at = [part.at / unit for part in parts]
     load = all_axes[0]
-    load.stairs([100 * part.load for part in parts], [*at, (parts[-1].at + width) / unit], fill=True, color=BLUE)
+    loads = [part.load or 0.0 for part in parts]
+    load.stairs([100 * value for value in loads], [*at, (parts[-1].at + width) / unit], fill=True, color=BLUE)
     load.set_ylabel("bus load, %")
-    load.set_ylim(0, max(10.0, min(100.0, 120 * max(part.load for part in parts))))
+    load.set_ylim(0, max(10.0, min(100.0, 120 * max(loads))))
+    _shade(load, [part.load is None for part in parts], [*at, (parts[-1].at + width) / unit])
     _plain(load)
     if shown:
         trouble = all_axes[1]
@@ -100,6 +103,19 @@ def _timeline(parts: Sequence[TimePart], width: float) -> Figure:
     all_axes[-1].set_xlabel(f"{name} since the start of the capture")
     all_axes[-1].set_xlim(at[0], (parts[-1].at + width) / unit)
     return figure
+
+
+def _shade(axes: Axes, unheard: Sequence[bool], edges: Sequence[float]) -> None:
+    """Where nobody heard the bus; `edges`: of the parts."""
+    label = "nobody heard the bus"
+    for missed, run in groupby(range(len(unheard)), lambda at: unheard[at]):
+        places = list(run)
+        if missed:
+            begin, end = edges[places[0]], edges[places[-1] + 1]
+            axes.axvspan(begin, end, facecolor="none", edgecolor=GREY, hatch="//", linewidth=0, label=label)
+            label = "_"  # no second line in the legend
+    if any(unheard):
+        axes.legend(fontsize=8, frameon=False, loc="lower left", bbox_to_anchor=(0, 1))
 
 
 def _values(trends: Sequence[ValueTrend], word: str) -> Figure:

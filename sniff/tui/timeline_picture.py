@@ -25,6 +25,9 @@ APART = 14
 """Cells between two of them at least."""
 TALLEST = 12
 """Lines of a chart; what is left over stays empty."""
+TELLING = ("load", "errors", "p95", "frames", "p50", "damaged", "noise")
+"""Charts, what must not be missing first."""
+UNHEARD = "░"
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +94,17 @@ def heights(charts: Sequence[Chart], room: int) -> list[int]:
     return made
 
 
-def draw_charts(text: Text, charts: Sequence[Chart], room: int, paint: Paint, cells: Sequence[int]) -> None:
+def most_telling(charts: Sequence[Chart], room: int) -> list[Chart]:
+    """Those that have a line each in `room`, one at least."""
+    kept = sorted(charts, key=lambda chart: TELLING.index(chart.name))[: max(1, room)]
+    return [chart for chart in charts if chart in kept]
+
+
+def draw_charts(
+    text: Text, charts: Sequence[Chart], room: int, paint: Paint, cells: Sequence[int], unheard: Sequence[bool]
+) -> None:
     """Add the charts: name and full height at the upper end of the axis, 0 at the lower one. `cells`: of each
-    column."""
+    column; `unheard`: where nobody listened."""
     for chart, height in zip(charts, heights(charts, room), strict=True):
         for line, bars in enumerate(tall_bars(chart.values, chart.top, height)):
             if height == 1:
@@ -104,7 +115,11 @@ def draw_charts(text: Text, charts: Sequence[Chart], room: int, paint: Paint, ce
                 label, corner = said.get(line, ""), "┤" if line in (0, height - 1) else "│"
             text.append(f"{label:<14}"[:14], style="bold" if line == 0 else "")
             text.append(corner, style="dim")
-            _append(text, bars, [paint(place, chart.style) for place in range(len(bars))], cells)
+            shown = "".join(
+                UNHEARD if missed and bar == " " else bar for bar, missed in zip(bars, unheard, strict=True)
+            )
+            styles = ["dim" if missed else chart.style for missed in unheard]
+            _append(text, shown, [paint(place, style) for place, style in enumerate(styles)], cells)
 
 
 def _append(text: Text, bars: str, styles: Sequence[str], cells: Sequence[int]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 from rich.text import Text
 from textual import events
@@ -251,7 +252,10 @@ class PollsScreen(TableScreen):
         text, top, cells = Text(no_wrap=True), max(sums), widths(len(sums), room)
         height = max(HEIGHT, self.query_one("#chart").size.height - AXIS)
         asked_in = f"in {seconds_in_words(zoom)}"
-        draw_charts(text, [Chart("asked", sums, top, str(top), style="cyan", of=asked_in)], height, _plain, cells)
+        edges = range(begin * NS_PER_S, (begin + (len(sums) + 1) * zoom) * NS_PER_S, zoom * NS_PER_S)
+        unheard = [self.store.load.drawn(0, *edge) is None for edge in pairwise(edges)]
+        chart = Chart("asked", sums, top, str(top), style="cyan", of=asked_in)
+        draw_charts(text, [chart], height, _plain, cells, unheard)
         return text.append("\n".join(axis(begin, zoom, -1, cells)))
 
     def _here(self) -> Poll | None:

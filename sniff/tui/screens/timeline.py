@@ -28,6 +28,7 @@ from sniff.tui.timeline_picture import (
     draw_charts,
     draw_rows,
     fitting,
+    most_telling,
     seconds_in_words,
     widths,
 )
@@ -45,11 +46,12 @@ LEAST_AXIS = 0.1
 
 
 class Column(NamedTuple):
-    """Some seconds of the bus drawn as one character. `begin`: s since the epoch; `load`: of all its time, `share`: of
-    what the capture covers of that, `heard` (ns), which is less where it begins and ends."""
+    """Some seconds of the bus drawn as one character. `begin`: s since the epoch; `load`: of its time, None where
+    nobody heard it; `share`: of what the capture covers of that, `heard` (ns), which is less where it begins and ends.
+    """
 
     begin: int
-    load: float
+    load: float | None
     share: float
     heard: int
     frames: int
@@ -71,8 +73,8 @@ def columns(store: Store, begin: int, width: int, zoom: int) -> list[Column]:
             noise=sum(part.noise for part in parts),
         )
         failed = _failed(store, at, at + zoom) if parts else 0
-        load = min(1.0, together.busy / (zoom * NS_PER_S))
         stretch = at * NS_PER_S, (at + zoom) * NS_PER_S
+        load = store.load.drawn(together.busy, *stretch)
         share, heard = store.load.share_of(together, *stretch), store.load.heard_of(*stretch)
         made.append(Column(at, load, share, heard, together.frames, together.damaged, together.noise, failed))
     return made
@@ -93,6 +95,7 @@ class TimelineScreen(ViewScreen):
         ("damaged noise", "frames and octets of noise in a column; the number is the most"),
         ("p95 p50", "time to the answers: 95 of 100 are shorter, half are shorter"),
         ("stations", "with how much went wrong in what is shown; dots: it was asked, bars: something went wrong"),
+        ("░", "nobody heard the bus: the adapter was away, octets were lost, or nothing was kept"),
         ("▲", "the cursor; what it stands on is said below"),
     )
     CSS_PATH = "timeline.tcss"
@@ -178,10 +181,12 @@ class TimelineScreen(ViewScreen):
             return f"{style} on {CHOSEN}" if chosen is not None and chosen[0] <= begin < chosen[1] else style
 
         rows = self._rows(len(made), zoom)
-        charts = self._charts(made, zoom)
-        room = self.size.height - OTHER_LINES - (1 if rows else 0)
+        room = self.size.height - OTHER_LINES
+        charts = most_telling(self._charts(made, zoom), room)
+        room -= 1 if rows else 0
         stations = rows[: max(LEAST_STATIONS, (room - 2 * len(charts)) // 3)] if room > 2 * len(charts) else []
-        draw_charts(text, charts, room - len(stations), paint, self._cells)
+        unheard = [column.load is None for column in made]
+        draw_charts(text, charts, room - len(stations), paint, self._cells, unheard)
         if stations:
             hidden = len(rows) - len(stations)
             more = f"; and {hidden} more" if hidden else ""
@@ -194,7 +199,7 @@ class TimelineScreen(ViewScreen):
         return text
 
     def _charts(self, made: list[Column], zoom: int) -> list[Chart]:
-        peak = max((column.load for column in made), default=0.0)
+        peak = max((column.load or 0.0 for column in made), default=0.0)
         load = next((step for step in LOADS if peak <= step), 1.0)
         median, most = self._exchanges.latencies(self._begin, len(made), zoom, (0.5, 0.95))
         each = f"in {seconds_in_words(zoom)}"
@@ -219,6 +224,9 @@ class TimelineScreen(ViewScreen):
     def _words(self, column: Column | None, zoom: int, chosen: tuple[int, int] | None) -> str:
         if column is None:
             return ""
+        if column.load is None and not column.frames:
+            ending = f" · one column {seconds_in_words(zoom)}"
+            return f"{clock(column.begin * NS_PER_S)[:8]} + {seconds_in_words(zoom)}: nobody heard the bus{ending}"
         is_part = column.heard < 0.99 * zoom * NS_PER_S
         words = (
             f"{clock(column.begin * NS_PER_S)[:8]} + {seconds_in_words(zoom)}: load {column.share:.1%}"

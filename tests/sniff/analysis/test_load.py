@@ -10,6 +10,7 @@ from dissectors.line import LineSettings
 from sniff.analysis.line_use import LineUse
 from sniff.analysis.load import Load
 from sniff.engine.engine import Output, Row
+from sniff.engine.session import LineEvent, LineEventKind
 from sniff.engine.table import Table
 
 SLOW = LineSettings.parse("1200,8E1")
@@ -65,3 +66,13 @@ def test_a_bus_that_falls_silent_is_not_as_busy_as_it_was() -> None:
     assert load.share(now=load.last + 5 * S) < 0.6
     assert load.share(now=load.last + 20 * S) == 0
     assert load.share(now=load.last - 20 * S) == busy
+
+
+def test_a_chart_shows_no_load_where_nobody_heard_the_bus() -> None:
+    load = Load(SLOW)
+    early, late = rows(2, 50 * S)
+    load.add(early)
+    load.add_line_event(LineEvent(55 * S, LineEventKind.OMITTED))
+    load.add(late)
+    drawn = [load.drawn(S, at * S, (at + 10) * S) for at in range(0, 70, 10)]
+    assert [value and round(value, 2) for value in drawn] == [0.1, 0.26, None, None, None, 0.2, 0.1]

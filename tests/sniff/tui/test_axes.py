@@ -13,7 +13,20 @@ from textual.app import App, ComposeResult
 
 from sniff.tui.plot import HAS_PLOT, HistoryPlot, ticks
 from sniff.tui.tables import count_cell
-from sniff.tui.timeline_picture import LABEL, WIDEST, Row, axis, draw_rows, fitting, widths
+from sniff.tui.timeline_picture import (
+    LABEL,
+    TELLING,
+    UNHEARD,
+    WIDEST,
+    Chart,
+    Row,
+    axis,
+    draw_charts,
+    draw_rows,
+    fitting,
+    most_telling,
+    widths,
+)
 from sniff.tui.times import interval, jitter, latency
 
 MS = 1_000_000
@@ -32,6 +45,16 @@ def test_the_axis_is_as_wide_as_its_columns() -> None:
     line, _ = axis(0, 2, 149, cells)
     assert len(line) == LABEL + 184
     assert line.endswith(("▲", "▲─"))
+
+
+def test_charts_leave_the_axis_its_lines_and_show_what_nobody_heard() -> None:
+    charts = [Chart(name, [1.0, None, 0.0], 1.0, "1") for name in reversed(TELLING)]
+    for room in range(9):
+        shown, text = most_telling(charts, room), Text()
+        draw_charts(text, shown, room, lambda _, style: style, [1, 1, 1], [False, True, False])
+        assert text.plain.count("\n") == max(1, room)
+        assert {chart.name for chart in shown} == set(TELLING[: max(1, room)])
+        assert {line[LABEL:] for line in text.plain.splitlines()} == {f"█{UNHEARD} "}
 
 
 def test_days_are_told_apart() -> None:
