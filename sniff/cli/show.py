@@ -8,6 +8,8 @@ import argparse
 import csv
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from dissectors.manifest import Dissector
@@ -98,29 +100,41 @@ def _show_all(args: argparse.Namespace, opened: Sequence[tuple[str, Capture]], t
             print(f"sniff485: rows of {len(opened)} captures; -e {SOURCE} says of which each is", file=sys.stderr)
         if source is not None and _is_text(args):
             print(f"\n{sanitized(source)}" if at else sanitized(source))
-        session = arguments.settings_of(args, capture.session, path)
-        devices = arguments.noted_devices(args, session)
-        proof, wanted = filtering.filter_of_both(args, capture, session, devices)
-        if wanted is not None and args.explain:
-            print(wanted.explain())
-            continue
-        named = (
-            args.tree or args.fields or _by_request(args.names, session)
-        )  # then every register is named, with a profile or without
-        spoken = devices if named or (devices and (not args.table or "text" in args.names)) else None
-        ours = _cells_of_filters(args.names, capture, session, devices)
-        listed = ListedRows(args, capture, session, proof, wanted, *(() if ours is None else (ours.noting,)))
-        only_source = bool(args.names) and all(name == SOURCE for name in args.names)
-        if args.reference or spoken or named or ours or args.hex or proof.name or only_source:
-            left = _show(args, listed.all(spoken), session, ours, left, table, source, path)
-        else:
-            left = _show_in_bulk(args, capture, session, proof, wanted, left, table, source, path)
-            if proof.name and left != 0:
-                left = _show(args, listed.of_both(spoken), session, ours, left, table, source, path)
-        say_incomplete(path, capture)
+        left = _show_capture(args, path, capture, source, table, left)
         if left == 0:
             break
     return 0
+
+
+def _show_capture(
+    args: argparse.Namespace,
+    path: str,
+    capture: Capture,
+    source: str | None,
+    table: ParquetWriter | None,
+    left: int | None,
+) -> int | None:
+    """List it, or explain how it would be filtered; how many rows are left to be shown, None for all."""
+    session = arguments.settings_of(args, capture.session, path)
+    devices = arguments.noted_devices(args, session)
+    proof, wanted = filtering.filter_of_both(args, capture, session, devices)
+    if wanted is not None and args.explain:
+        print(wanted.explain())
+        return left
+    # with a tree or fields every register is named, with a profile or without
+    are_named = args.tree or args.fields or _by_request(args.names, session)
+    spoken = devices if are_named or (devices and (not args.table or "text" in args.names)) else None
+    shown = _Shown(args, path, source, session, table, _cells_of_filters(args.names, capture, session, devices))
+    listed = ListedRows(args, capture, session, proof, wanted, *(() if shown.ours is None else (shown.ours.noting,)))
+    only_source = bool(args.names) and all(name == SOURCE for name in args.names)
+    if args.reference or spoken or are_named or shown.ours or args.hex or proof.name or only_source:
+        left = _show(shown, listed.all(spoken), left)
+    else:
+        left = _show_in_bulk(shown, capture, proof, wanted, left)
+        if proof.name and left != 0:
+            left = _show(shown, listed.of_both(spoken), left)
+    say_incomplete(path, capture)
+    return left
 
 
 def _is_text(args: argparse.Namespace) -> bool:
@@ -148,57 +162,69 @@ def _by_request(names: list[str], session: Session) -> bool:
     return any(types[name].by_request for name in names if name in types)
 
 
-def _show(
-    args: argparse.Namespace,
-    items: Iterable[tuple[JudgedRow, Dissector]],
-    session: Session,
-    ours: FieldCells | None,
-    left: int | None,
-    table: ParquetWriter | None,
-    source: str | None,
-    path: str,
-) -> int | None:
-    colour = arguments.colour()
-    usual = dissector_for(session)
-    first = () if source is None else (source,)
-    writer = csv.writer(sys.stdout, delimiter="," if args.csv else "\t", lineterminator="\n", quoting=csv.QUOTE_MINIMAL)
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """A capture that is listed, and how. `source`: what rows say of whose they are, None of a single capture. `table`:
+    where they go instead of standard output. `ours`: names of `-e` that only filters know."""
+
+    args: argparse.Namespace
+    path: str
+    source: str | None
+    session: Session
+    table: ParquetWriter | None
+    ours: FieldCells | None
+
+    @property
+    def first(self) -> tuple[str, ...]:
+        """What each row of a table begins with."""
+        return () if self.source is None else (self.source,)
+
+
+def _show(shown: _Shown, items: Iterable[tuple[JudgedRow, Dissector]], left: int | None) -> int | None:
+    """Rows one by one, `left` of them, None for all; how many are left."""
+    list_row = _lister(shown)
     for item, dissector in items if left != 0 else ():
         left = None if left is None else left - 1
-        if table is not None:
-            table.add([*first, *rows.typed(item, dissector, session)])
-        elif args.csv:
-            values = rows.to_json(item, dissector, session).values()
-            writer.writerow([plain_cell(value) for value in (*first, *values)])
-        elif args.table:
-            writer.writerow(_cells(item, args.names, dissector, session, ours, path))
-        elif args.json:
-            print(rows.json_line(item, dissector, session, args.fields, source))
-        else:
-            title = dissector.title if dissector is not usual else ""
-            print(rows.text_line(item, dissector, session, colour, title))
-            if args.tree:
-                print(_tree(item, dissector, session))
-            if args.hex:
-                print(rows.hex_dump(item.row.event.octets))
+        list_row(item, dissector)
         if left == 0:
             break
     return left
 
 
+def _lister(shown: _Shown) -> Callable[[JudgedRow, Dissector], None]:
+    """What lists a row."""
+    args, session, table = shown.args, shown.session, shown.table
+    writer = csv.writer(sys.stdout, delimiter="," if args.csv else "\t", lineterminator="\n", quoting=csv.QUOTE_MINIMAL)
+    if table is not None:
+        return lambda item, dissector: table.add([*shown.first, *rows.typed(item, dissector, session)])
+    if args.csv:
+        return lambda item, dissector: writer.writerow(
+            [plain_cell(value) for value in (*shown.first, *rows.to_json(item, dissector, session).values())]
+        )
+    if args.table:
+        return lambda item, dissector: writer.writerow(_cells(shown, item, dissector))
+    if args.json:
+        return lambda item, dissector: print(rows.json_line(item, dissector, session, args.fields, shown.source))
+    return partial(_print_row, shown, dissector_for(session), arguments.colour())
+
+
+def _print_row(shown: _Shown, usual: Dissector, colour: bool, item: JudgedRow, dissector: Dissector) -> None:
+    """For people. `usual`: the protocol that is not named."""
+    title = dissector.title if dissector is not usual else ""
+    print(rows.text_line(item, dissector, shown.session, colour, title))
+    if shown.args.tree:
+        print(_tree(item, dissector, shown.session))
+    if shown.args.hex:
+        print(rows.hex_dump(item.row.event.octets))
+
+
 def _show_in_bulk(
-    args: argparse.Namespace,
-    capture: Capture,
-    session: Session,
-    proof: SecondProof,
-    wanted: Filter | None,
-    left: int | None,
-    table: ParquetWriter | None,
-    source: str | None,
-    path: str,
+    shown: _Shown, capture: Capture, proof: SecondProof, wanted: Filter | None, left: int | None
 ) -> int | None:
     """The rows before the first that may be one of a second protocol."""
-    listed = _listed(args, dissector_for(session), session, table, source, path)
-    for settled_rows in settled_columns(Watched(capture, prints=True), session, proof) if left != 0 else ():
+    list_rows = _lister_of_many(shown)
+    watched = Watched(capture, prints=True)
+    for settled_rows in settled_columns(watched, shown.session, proof) if left != 0 else ():
         places, first = _chosen(settled_rows, wanted), settled_rows.table.first
         if proof.name:
             places = places[places + first < proof.since]
@@ -206,7 +232,7 @@ def _show_in_bulk(
             places = places[:left]
             left -= len(places)
         if len(places):
-            listed(settled_rows, places)
+            list_rows(settled_rows, places)
         if left == 0 or (proof.name and first + settled_rows.end > proof.since):
             break
     return left
@@ -222,16 +248,10 @@ def _chosen(some: SettledRows, wanted: Filter | None) -> Times:
     return chosen(some, wanted)
 
 
-def _listed(
-    args: argparse.Namespace,
-    dissector: Dissector,
-    session: Session,
-    table: ParquetWriter | None,
-    source: str | None,
-    path: str,
-) -> Callable[[SettledRows, Times], None]:
+def _lister_of_many(shown: _Shown) -> Callable[[SettledRows, Times], None]:
     """What lists rows at some places."""
-    first = () if source is None else (source,)
+    args, session, table = shown.args, shown.session, shown.table
+    dissector = dissector_for(session)
     if table is not None:
         from sniff.cli.row_columns import RowColumns
 
@@ -239,7 +259,7 @@ def _listed(
 
         def added(some: SettledRows, places: Times) -> None:
             for cells in columns.cells(some, places.tolist(), rows.JSON_KEYS, lambda cell: cell, instants=True):
-                table.add([*first, *cells])
+                table.add([*shown.first, *cells])
 
         return added
     made: RowCells | RowLines
@@ -247,12 +267,12 @@ def _listed(
         from sniff.cli.row_cells import RowCells, chosen, json_lines, separated
 
         if args.csv:
-            made = RowCells(dissector, session, rows.JSON_KEYS, separated(len(rows.JSON_KEYS), ",", first))
+            made = RowCells(dissector, session, rows.JSON_KEYS, separated(len(rows.JSON_KEYS), ",", shown.first))
         elif args.table:
             names = [name for name in args.names if name != SOURCE]
-            made = RowCells(dissector, session, names, chosen(args.names, path))
+            made = RowCells(dissector, session, names, chosen(args.names, shown.path))
         else:
-            made = RowCells(dissector, session, rows.JSON_KEYS, json_lines(rows.JSON_KEYS, source))
+            made = RowCells(dissector, session, rows.JSON_KEYS, json_lines(rows.JSON_KEYS, shown.source))
     else:
         from sniff.cli.row_lines import RowLines
 
@@ -260,12 +280,11 @@ def _listed(
     return lambda some, places: standard_streams.write(made.lines(some, places))
 
 
-def _cells(
-    item: JudgedRow, names: list[str], dissector: Dissector, session: Session, ours: FieldCells | None, path: str
-) -> list[Cell]:
+def _cells(shown: _Shown, item: JudgedRow, dissector: Dissector) -> list[Cell]:
+    names, ours = shown.args.names, shown.ours
     fields = rows.fields_of(item, dissector)
     if any(name not in fields for name in names):
-        fields = {**rows.to_json(item, dissector, session), **fields, SOURCE: path}
+        fields = {**rows.to_json(item, dissector, shown.session), **fields, SOURCE: shown.path}
     return [
         ours.cell(name, item.row, item.transaction) if ours and name in ours else plain_cell(fields.get(name))
         for name in names
