@@ -42,66 +42,76 @@ def _of_values(given: Any) -> dict[str, int | float | str]:
 
 def guarded(dissector: Dissector) -> Dissector:
     """The same protocol, whose `peek`, `text`, `fields` and `packet` never raise and give what they should."""
+    guard = _Guard(dissector)
+    return replace(
+        dissector,
+        peek=guard.peek,
+        text=guard.text,
+        meant=guard.meant,
+        fields=guard.fields,
+        packet=guard.packet,
+        scenarios=guard.scenarios,
+        renamer=None if dissector.renamer is None else guard.renamer,
+    )
 
-    def failed(function: str, error: Exception) -> str:
-        said = "".join(c if c.isprintable() else "." for c in str(error))[:LONGEST]
-        return f"{function} of plug-in {dissector.name!r} failed: {type(error).__name__}{': ' if said else ''}{said}"
 
-    def peek(frame: Frame) -> Header:
+class _Guard:
+    """The functions of a protocol, each with something to give where it fails."""
+
+    def __init__(self, dissector: Dissector) -> None:
+        self._dissector = dissector
+        self._meaning = replace(dissector, text=self.text)
+
+    def peek(self, frame: Frame) -> Header:
+        name = self._dissector.name
         try:
-            return _of_type(dissector.peek(frame), Header)
+            return _of_type(self._dissector.peek(frame), Header)
         except Exception as error:
-            words = failed("peek", error)
-            return FailedHeader(dissector.name, None, None, Role.UNKNOWN, "unknown", ok=frame.ok, error=words)
+            words = self._failed("peek", error)
+            return FailedHeader(name, None, None, Role.UNKNOWN, "unknown", ok=frame.ok, error=words)
 
-    def text(frame: Frame, header: Header, role: Role) -> str:
+    def text(self, frame: Frame, header: Header, role: Role) -> str:
         if isinstance(header, FailedHeader):
             return header.error or ""
         try:
-            return _of_type(dissector.text(frame, header, role), str)
+            return _of_type(self._dissector.text(frame, header, role), str)
         except Exception as error:
-            return failed("text", error)
+            return self._failed("text", error)
 
-    def meant(frame: Frame, header: Header, role: Role, meaning: Meaning) -> str:
+    def meant(self, frame: Frame, header: Header, role: Role, meaning: Meaning) -> str:
         try:
-            return _of_type(replace(dissector, text=text).line(frame, header, role, meaning), str)
+            return _of_type(self._meaning.line(frame, header, role, meaning), str)
         except Exception as error:
-            return failed("meant", error)
+            return self._failed("meant", error)
 
-    def fields(frame: Frame, role: Role) -> dict[str, int | float | str]:
+    def fields(self, frame: Frame, role: Role) -> dict[str, int | float | str]:
         try:
-            return _of_values(dissector.fields(frame, role))
+            return _of_values(self._dissector.fields(frame, role))
         except Exception as error:
-            return {f"{dissector.name}.error": failed("fields", error)}
+            return {f"{self._dissector.name}.error": self._failed("fields", error)}
 
-    def packet(frame: Frame, role: Role) -> Any:
+    def packet(self, frame: Frame, role: Role) -> Any:
         try:
-            return dissector.packet(frame, role)
+            return self._dissector.packet(frame, role)
         except Exception:
             from scapy.packet import Raw
 
             return Raw(frame.octets)
 
-    def renamer() -> Renamer:
-        assert dissector.renamer is not None
-        return _Renaming(dissector.name, dissector.renamer())
+    def renamer(self) -> Renamer:
+        assert self._dissector.renamer is not None
+        return _Renaming(self._dissector.name, self._dissector.renamer())
 
-    def scenarios() -> Mapping[str, SimulatedBus]:
+    def scenarios(self) -> Mapping[str, SimulatedBus]:
         try:
-            return dissector.scenarios()
+            return self._dissector.scenarios()
         except Exception:
             return {}  # its buses cannot be had; those of others can
 
-    return replace(
-        dissector,
-        peek=peek,
-        text=text,
-        meant=meant,
-        fields=fields,
-        packet=packet,
-        scenarios=scenarios,
-        renamer=None if dissector.renamer is None else renamer,
-    )
+    def _failed(self, function: str, error: Exception) -> str:
+        said = "".join(c if c.isprintable() else "." for c in str(error))[:LONGEST]
+        words = f"{type(error).__name__}{': ' if said else ''}{said}"
+        return f"{function} of plug-in {self._dissector.name!r} failed: {words}"
 
 
 class _Renaming:
