@@ -81,16 +81,14 @@ class BulkLineFindings(LineFindings):
 
         table = columns.table
         first, last = (columns.name(int(columns.sender[place]), self._nouns) for place in (begin, end - 1))
-        self._pieces.forget()
-        self._settle_strays(first, int(table.slack[begin]))
+        self._between.see_good(first, int(table.slack[begin]))
         only_master = bool(columns.asks[begin:end].all())
         self._senders.see_good(last, int(table.frames.end[end - 1]), only_master)
         role = columns.role_before(begin, end)
         self._awaiting = self._awaiting if role is None else role is Role.REQUEST
-        self._asker = last if columns.role_before(end - 1, end) is Role.REQUEST else None
+        asker = last if columns.role_before(end - 1, end) is Role.REQUEST else None
         asked = int(table.placed.destination[end - 1]) if table.placed.tx[end - 1] else NONE
-        self._called_last = self._called(None if asked == NONE else asked, table.protocol)
-        self._before_ok = True
+        self._between.follow(asker, self._called(None if asked == NONE else asked, table.protocol), ok=True)
         self._patterns.see_good(table.frames.end[begin:end])
 
     def _settle_many(self, closed: TransactionColumns) -> None:

@@ -6,15 +6,15 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
-from typing import NamedTuple
 
 from dissectors.chances import is_rare
-from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, found, times
-from dissectors.frame import Chunk, Event, Flaw, Frame, LineError, Noise, Place, Reason, Role
-from dissectors.line import MS, LineSettings
+from dissectors.findings import Finding, Severity, Tally, counted, found, times
+from dissectors.frame import Chunk, Event, Flaw, Frame, LineError, Noise, Reason, Role
+from dissectors.line import LineSettings
 from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction
 from dissectors.words import milliseconds, percent
+from sniff.analysis.between_frames import BetweenFrames
 from sniff.analysis.breaks import LEVELS, breaks_in
 from sniff.analysis.echo_findings import EchoesHeard
 from sniff.analysis.judgement import Heard, Judgement
@@ -22,22 +22,12 @@ from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.line_use import LineUse
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, lacking_bits, what_fits
 from sniff.analysis.port_presence import PortPresence
-from sniff.analysis.remains import Remains
-from sniff.analysis.sender_findings import BUS, MASTER, MOST_SENDERS, WRONG, Senders, sender_of
-from sniff.analysis.stray_findings import strays_found
+from sniff.analysis.sender_findings import BUS, WRONG, Senders, sender_of
 from sniff.analysis.time_patterns import Stop, TimePatterns
-from sniff.analysis.torn_pieces import TornPieces
-from sniff.analysis.unsure_strays import UnsureStrays
 from sniff.analysis.wording import station_word
 from sniff.engine.engine import Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent, LineEventKind, Session
-
-STRAY_MOST = 3
-"""So many octets that are no frame are stray ones; more are the remains of something."""
-
-OUTWEIGHED = 20
-"""So many octets in longer stretches for each stray one, and the strays are theirs."""
 
 MENDED_LEAST = 3
 """So many frames that are good but for one and the same thing are a system, and prove the settings as good ones do."""
@@ -47,31 +37,6 @@ MARKED_MANY = 5
 
 COUNTED_OCTETS = 4096
 """Of longer rows the octets are not counted by value."""
-
-READ_LATE = MS
-"""ns of slack over the adapter's latency that prove a late read (`sniff.engine.late_reads`)."""
-
-
-class _Stray(NamedTuple):
-    """Stray octets beside a frame; `asker`: who had asked before them, where an answer was due; `asked`: whom; `joins`:
-    they began where that frame ended."""
-
-    no: int
-    noise: Noise
-    asker: str | None
-    asked: str | None
-    joins: bool
-
-    def told(self, sender: str) -> tuple[str, str]:
-        """Whose they are and by which rule, once `sender` has sent a frame.
-
-        Who asks again had no answer, or none that can be told: they may be what there was of it, and are nobody's.
-        """
-        if self.asker is not None and sender in (self.asker, BUS):
-            return BUS, "LN203"
-        if self.noise.place is Place.AFTER and self.asker is not None:
-            return self.asker, "LN202"
-        return sender, "LN201"
 
 
 class LineFindings:
@@ -98,19 +63,10 @@ class LineFindings:
         self._is_lost_counted = True
         self._echoes = EchoesHeard(session.timing.latency)
         self._values: Counter[int] = Counter()
-        self._before_ok = True  # the newest frame
         self._awaiting = False  # a request was the newest frame of a known kind
-        self._asker: str | None = None  # who sent the newest frame, if that was a request
-        self._called_last: str | None = None  # whom the newest frame was sent to
-        self._awaited = 0  # strays away from frames, while an answer is due
-        self._instead: Counter[str] = Counter()  # strays that came in place of an answer, by who was asked
-        self._ahead: Counter[str] = Counter()  # strays apart from frames before an answer, by who gave it
-        self._pending: list[_Stray] = []  # noise beside frames, of which the frame to come tells
-        self._begins = UnsureStrays()  # noise that may be the begin of the frame to come
-        self._pieces = TornPieces(dissector or dissector_for(session), session.timing, STRAY_MOST)
+        self._between = BetweenFrames(session, dissector or dissector_for(session), self._senders)
         self._sample: list[Chunk] = []  # what came first, to ask what else it may be
         self._sampled = 0
-        self._remains = Remains(session)
         self._fit: tuple[int, Fit | None] = (0, None)  # asked when so many octets were sampled
 
     # ---- taking in
@@ -193,7 +149,6 @@ class LineFindings:
             sender = "bus"  # nobody was asked: it may be anything
         self._awaiting = role is Role.REQUEST or (self._awaiting and role is not Role.RESPONSE)
         self._frames += 1
-        self._before_ok = frame.ok
         if frame.ok:
             self._good += 1
             self._in_frames += len(frame.octets)
@@ -201,74 +156,19 @@ class LineFindings:
             frames, octets = self._mended.get(frame.repair.flaw, (0, 0))
             self._mended[frame.repair.flaw] = frames + 1, octets + len(frame.octets)
         self._senders.see(sender, row.no, frame)
-        if frame.ok:
-            self._pieces.forget()
-        elif self._pieces.complete(frame.octets):
-            self._take_torn(sender, row.no, frame)
-        self._settle_strays(sender, frame.slack)
-        self._asker = sender if role is Role.REQUEST else None
+        self._between.see_frame(sender, row.no, frame)
         asked = row.placement.destination if row.placement is not None else None
-        self._called_last = self._called(asked, frame.protocol)
+        asker = sender if role is Role.REQUEST else None
+        self._between.follow(asker, self._called(asked, frame.protocol), frame.ok)
         return sender
 
     def _called(self, station: int | None, protocol: str) -> str | None:
         return None if station is None else f"{self._nouns(protocol)} {station}"
 
-    def _settle_strays(self, sender: str, slack: int) -> None:
-        """A frame has come, read at most `slack` ns late: what the octets before it were."""
-        if slack <= self._session.timing.latency + READ_LATE:
-            for stray in self._pending:
-                name, code = stray.told(sender)
-                self._senders.stray(name, code, stray.no, stray.noise)
-                if code == "LN203" and stray.joins and stray.asker is not None:
-                    self._senders.of(stray.asker).joined.add(stray.no, stray.noise)
-                self._count_instead(code == "LN203", stray.asked)
-            if self._asker is not None and sender in (self._asker, BUS):  # as in `_Stray.told`
-                self._count_instead(self._awaited, self._called_last)
-            elif self._asker is not None and self._awaited and sender in self._senders.by_name:
-                self._ahead[sender] += 1
-            self._begins.forget()
-            self._pending.clear()
-        else:
-            self._take_back_strays()
-        self._awaited = 0
-
-    def _count_instead(self, count: int, asked: str | None) -> None:
-        if count and asked is not None and (asked in self._instead or len(self._instead) < MOST_SENDERS):
-            self._instead[asked] += count
-
-    def _take_back_strays(self) -> None:
-        """They are what was read in time of a frame that was torn."""
-        self._begins.take_back(self._senders)
-        self._pending.clear()
-
-    def _take_torn(self, sender: str, no: int, event: Event) -> None:
-        """What came since the last good frame is one in pieces: neither strays nor octets that are no frame."""
-        self._take_back_strays()
-        self._remains.take_back(self._pieces.remains)
-        self._pieces.take(sender, event.start, no)
-
     def _see_noise(self, no: int, noise: Noise) -> None:
-        if noise.reason is Reason.PAD or breaks_in(noise):
-            return
-        if self._rows == 1:  # the capture began in the middle of something
-            return
-        if self._pieces.complete(noise.octets):  # behind the damaged begin, whose sender is known
-            sender = BUS if self._before_ok or self._senders.before is None else self._senders.before
-            self._take_torn(sender, no, noise)
-            return
-        of_damaged = noise.place is not Place.BETWEEN and not self._before_ok  # where a damaged frame ends nobody knows
-        if len(noise.octets) > STRAY_MOST or of_damaged:
-            self._remains.add(no, noise, None if self._asker is None else self._called_last)
-            self._pieces.count_remains(len(noise.octets))
-        elif noise.place is Place.BEFORE or (noise.place is Place.AFTER and self._asker is not None):
-            self._pending.append(_Stray(no, noise, self._asker, self._called_last, self._senders.joins(noise)))
-            del self._pending[:-8]
-        elif noise.place is Place.AFTER and self._senders.before is not None:
-            self._begins.add(self._senders, self._senders.before, "LN202", no, noise)
-        else:
-            self._awaited += self._asker is not None
-            self._begins.add(self._senders, BUS, "LN203", no, noise)
+        is_begin = self._rows == 1  # of the capture, in the middle of something
+        if noise.reason is not Reason.PAD and not breaks_in(noise) and not is_begin:
+            self._between.see_noise(no, noise)
 
     # ---- judging
 
@@ -403,15 +303,7 @@ class LineFindings:
 
     def _of_bus(self) -> Iterator[Finding]:
         yield from self._senders.breaks_found(self._note_if)
-        rests = self._remains.found(self._octets, self._senders.by_name.keys() - {BUS, MASTER})
-        for stray in strays_found(self._senders, self._instead, self._ahead, self._note_if):
-            many = stray.code == "LN203" and stray.subject == BUS and self._remains.octets > OUTWEIGHED * stray.count
-            is_part = rests is not None and rests.severity >= Severity.WARNING and many
-            yield as_consequence(stray, rests, RULES) if rests is not None and is_part else stray
-        if rests is not None:
-            yield rests
-        frames = {name: one.frames for name, one in self._senders.by_name.items() if name != BUS}
-        yield from self._pieces.found(frames, MASTER)
+        yield from self._between.found(self._octets, self._note_if)
         echoes = self._echoes.found()
         if echoes is not None:
             yield echoes
