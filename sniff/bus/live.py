@@ -25,7 +25,7 @@ from sniff.bus.autodetect import Search, SearchProgress
 from sniff.bus.derived_topics import NODES_A_SECOND, NODES_AT_ONCE, BusChannels
 from sniff.bus.model import BusModel
 from sniff.bus.recorded_values import RecordedValues
-from sniff.bus.router import Router, octets_of
+from sniff.bus.router import Router, octets_of, reads_in
 from sniff.bus.thinning import Budget
 from sniff.capture.ipc import Batch, Ended, HeardOctets, ReceivedMessage, Status, Tick, one_by_one
 from sniff.capture.link import CaptureLink
@@ -209,10 +209,10 @@ class LiveBus:
     def _next(self) -> list[LiveTables]:
         """Take the next message; once the time is over, reads are only counted."""
         message = self._pending.popleft()
-        octets = octets_of(message)
-        if not octets:
+        came, octets = reads_in(message), octets_of(message)
+        if isinstance(message, Ended) or came is None or not octets:
             return self._take(message)
-        if message.bus != self.bus:  # type: ignore[union-attr]
+        if message.bus != self.bus:
             return []
         if self._is_late:
             self._late += octets
@@ -220,13 +220,12 @@ class LiveBus:
                 self._skipped += octets
                 return []
         if self._values is not None:
-            self._values.hear(octets, len(message.block) if isinstance(message, HeardOctets) else 1)
+            self._values.hear(octets, len(came) if isinstance(came, Block) else 1)
         if self.engine.searching:
             return self._search_on(message)
-        item = message.block if isinstance(message, HeardOctets) else message.item  # type: ignore[union-attr]
         if not self._gathering.count:
-            self._gathered_since = int(item.reads.times[0]) if isinstance(item, Block) else item.time
-        self._gathering.add(item)  # type: ignore[arg-type]
+            self._gathered_since = int(came.reads.times[0]) if isinstance(came, Block) else came.time
+        self._gathering.add(came)
         return self._look() if self._gathering.octets >= PIECE else []
 
     def _search_on(self, message: Batch) -> list[LiveTables]:

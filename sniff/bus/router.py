@@ -7,6 +7,7 @@ from collections import Counter, deque
 from dissectors.frame import Chunk
 from sniff.capture.ipc import Batch, Ended, HeardOctets, ReceivedMessage, Tick
 from sniff.capture.link import CaptureLink
+from sniff.engine.blocks import Block
 
 HELD = 4 << 20
 """Octets kept for a bus that nobody asks for; more are dropped, and counted. The recording has them."""
@@ -66,6 +67,14 @@ class Router:
 
 def octets_of(message: Batch) -> int:
     """How many octets of the line came with it."""
+    came = reads_in(message)
+    if came is None:
+        return 0
+    return len(came.octets) if isinstance(came, Chunk) else len(came.reads.octets)
+
+
+def reads_in(message: Batch) -> Block | Chunk | None:
+    """What it brings of the line; None where it says something else."""
     if isinstance(message, HeardOctets):
-        return len(message.block.reads.octets)
-    return len(message.item.octets) if isinstance(message, ReceivedMessage) and isinstance(message.item, Chunk) else 0
+        return message.block
+    return message.item if isinstance(message, ReceivedMessage) and isinstance(message.item, Chunk) else None

@@ -78,11 +78,6 @@ class Triggers:
             )
         return wanted
 
-    @property
-    def on_findings(self) -> bool:
-        """Whether any of them is a rule."""
-        return bool(self._codes)
-
     def see(self, item: Table | Output) -> Iterator[Fired]:
         """Take what the engine gave."""
         if not self._filters:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Protocol, Self, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent
@@ -30,14 +30,6 @@ class TableObserver(Protocol):
 
     def add_table(self, table: Table) -> None:
         """Take rows and transactions; the same as one after the other."""
-        ...
-
-
-class Mergeable(Protocol):
-    """An observer of a part of a bus, whose value can be put together with that of the part that follows."""
-
-    def merge(self, later: Self) -> Self:
-        """Both together, as a new value: what an observer of the whole would be."""
         ...
 
 
