@@ -47,12 +47,12 @@ stylesheet.parse = _parsed_once  # type: ignore[assignment]
 _draw = Screen._compositor_refresh
 
 
-def _drawn_when_settled(screen: Screen) -> None:
+def _drawn_when_looked_at(screen: Screen) -> None:
     """What stands on a screen between a key and its last consequence nobody sees here, and how often it would be drawn
-    meanwhile depends on what else the machine does: `Looking.settle` draws it."""
+    meanwhile depends on what else the machine does: `Looking.draw` draws it, for who looks at it."""
 
 
-Screen._compositor_refresh = _drawn_when_settled  # type: ignore[method-assign]
+Screen._compositor_refresh = _drawn_when_looked_at  # type: ignore[method-assign]
 
 MS = 1_000_000
 START = 1_772_359_200_000_000_000  # 2026-03-01T10:00:00Z
@@ -248,6 +248,9 @@ class Looking:
             if idle and not self._waits_for_layout():
                 break
         await self.pilot.pause(0)
+
+    def draw(self) -> None:
+        """Draw what is not drawn yet, as a terminal would get it; who reads the screen has it drawn."""
         _draw(self.app.screen)
 
     def _waits_for_layout(self) -> bool:
@@ -277,8 +280,16 @@ class Looking:
     def main(self) -> Any:
         return self.app.shown.query_one("#main")
 
+    @property
+    def drawn_lines(self) -> int:
+        """How many lines of the screen's list were ever drawn, those that are due now among them."""
+        self.draw()
+        drawn: int = self.main.drawn_lines
+        return drawn
+
     def lines(self) -> list[str]:
         """The screen as text, a string a line, without spaces at the end."""
+        self.draw()
         strips = self.app.screen._compositor.render_strips()
         return ["".join(segment.text for segment in strip).rstrip() for strip in strips]
 
@@ -312,6 +323,8 @@ def look(monkeypatch: pytest.MonkeyPatch) -> Callable[..., SnifferApp]:
                 looking = Looking(app, pilot, feed)
                 await looking.settle()
                 await script(looking)
+                if app.screen_stack:
+                    looking.draw()
 
         asyncio.run(main())
         return app

@@ -43,11 +43,11 @@ def test_a_jump_lays_the_screen_out_once(look: Any, long_bus: Any, layouts: list
         await see.press("colon")
         await see.type("100")
         layouts.clear()
-        drawn = see.main.drawn_lines
+        drawn = see.drawn_lines
         await see.press("enter")
         assert see.app.viewing.row == 100
         assert len(layouts) == 1
-        assert see.main.drawn_lines - drawn <= 2 * see.main.visible_lines  # a busy machine may paint in between
+        assert see.drawn_lines - drawn <= 2 * see.main.visible_lines  # a busy machine may paint in between
 
     look(long_bus.store, script, ROOMY)
 
@@ -56,11 +56,11 @@ def test_another_row_needs_no_layout(look: Any, long_bus: Any, layouts: list[obj
     async def script(see: Any) -> None:
         await see.press("down")
         layouts.clear()
-        drawn = see.main.drawn_lines
+        drawn = see.drawn_lines
         await see.press("down", "down")
         assert see.app.screen.query_one(HexPane).row == 4
         assert not layouts
-        assert see.main.drawn_lines - drawn <= 8  # the cursor and its partner, before and after
+        assert see.drawn_lines - drawn <= 8  # the cursor and its partner, before and after
 
     look(long_bus.store, script, ROOMY)
 

@@ -89,9 +89,9 @@ def cost(look: Any, store: Store, asked: Asked, size: tuple[int, int]) -> dict[s
 
     async def script(see: Any) -> None:
         for key in ("end", "up", "pageup", "home", "pagedown", "t"):
-            before = see.main.drawn_lines, asked.rows
+            before = see.drawn_lines, asked.rows
             await see.press(key)
-            costs[key] = (see.main.drawn_lines - before[0], asked.rows - before[1])
+            costs[key] = (see.drawn_lines - before[0], asked.rows - before[1])
 
     look(store, script, size)
     return costs
@@ -180,14 +180,14 @@ def test_only_lines_that_changed_are_drawn(look: Any, store_of: Any) -> None:
 
     async def script(see: Any) -> None:
         await see.press("down")
-        before = see.main.drawn_lines
+        before = see.drawn_lines
         await see.press("down")
-        assert see.main.drawn_lines - before == 2  # where the cursor was and where it is
-        before = see.main.drawn_lines
+        assert see.drawn_lines - before == 2  # where the cursor was and where it is
+        before = see.drawn_lines
         for _ in range(5):
             store.add_table(made_table(store.last_no + 1, 10))
             await see.poll()
         assert see.main.index.last == 1050
-        assert see.main.drawn_lines == before  # nothing of it is in sight
+        assert see.drawn_lines == before  # nothing of it is in sight
 
     look(store, script)
