@@ -18,6 +18,7 @@ from dissectors.frame import Chunk
 from dissectors.modbus.envelope import seal_rtu
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.recording.reader import McapCapture
+from tests.e2e import warm_start
 
 pytest.importorskip("termios")
 
@@ -67,7 +68,7 @@ def record(tmp_path: Path) -> Iterator:
         environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
         command = [sys.executable, "-m", "sniff", "record", *words, "-w", "site.mcap"]
         running.append(
-            subprocess.Popen(
+            warm_start.Popen(
                 command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
             )
         )
