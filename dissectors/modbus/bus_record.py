@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from dissectors import busiest
 from dissectors.chances import is_rare
 from dissectors.findings import Tally, together
 from dissectors.frame import Flaw
@@ -307,6 +308,10 @@ class BusRecord:
     def rare(self, count: int, of: int, when: Tally | None = None) -> bool:
         """Whether so few are not worth a warning. `when`: they themselves, where it is known when they came."""
         return is_rare(count, of, self.span, None if when is None else when.quarters)
+
+    def when(self, tally: Tally, of: int, count: int | None = None) -> str:
+        """How many of them, or of `count` of them, came within a quarter of an hour, where that was a fault; or ""."""
+        return busiest.words(tally.quarters, tally.count if count is None else count, of, self.span)
 
 
 def _usual(station: StationRecord) -> int:

@@ -64,10 +64,9 @@ def _of_bus(seen: BusRecord, is_blamed: bool, scanned: list[int], unheard: list[
     requests = sum(station.asked for station in seen.stations.values()) + seen.damaged_requests.count
     damaged = seen.damaged_requests
     if damaged.count:
-        words = f"{damaged.count} of {counted(requests, 'request')} damaged"
-        yield damaged.found(
-            RULES["MB009"], "master", words, note_if(seen.rare(damaged.count, requests) or not is_blamed)
-        )
+        words = f"{damaged.count} of {counted(requests, 'request')} damaged{seen.when(damaged, requests)}"
+        rare = seen.rare(damaged.count, requests, damaged)
+        yield damaged.found(RULES["MB009"], "master", words, note_if(rare or not is_blamed))
     if not damaged.count or seen.damaged_here.count > damaged.count:
         yield from _damaged_here(seen, requests)
     yield from _cut_by_master(seen)
@@ -126,7 +125,8 @@ def _damaged_here(seen: BusRecord, requests: int) -> Iterator[Finding]:
     damaged, others = seen.damaged_here, sum(station.damaged.count for station in seen.stations.values())
     if damaged.count:
         words = f"{damaged.count} of {counted(requests, 'request')} damaged here, and answered all the same"
-        rare = seen.rare(damaged.count, requests) or 4 * others > damaged.count
+        words += seen.when(damaged, requests)
+        rare = seen.rare(damaged.count, requests, damaged) or 4 * others > damaged.count
         yield damaged.found(RULES["MB022"], "bus", words, note_if(rare))
 
 
@@ -205,7 +205,7 @@ def _of_requests(seen: BusRecord) -> Iterator[Finding]:
         is_chance = flaw in SPOILT and falls_there_by_chance(seen, "master", tally.count, damaged)
         if tally.count >= _CUT_LEAST and of * tally.count >= damaged and not is_chance:
             words = f"{counted(tally.count, 'request')} good but for one thing: {flaw.value}"
-            severity = note_if(seen.rare(tally.count, seen.requests))
+            severity = note_if(seen.rare(tally.count, seen.requests, tally))
             # where not one is good no station can answer; writes that lack their end are not put right
             is_cut = flaw in _CUT and damaged >= seen.requests and 4 * tally.count >= 3 * damaged
             is_always = is_cut or tally.count == seen.requests

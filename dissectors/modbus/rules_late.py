@@ -58,7 +58,7 @@ def of_impatience(seen: BusRecord, timeout: int | None) -> Iterator[Finding]:
     if shown.damaged:
         words += f"; {shown.overdue} of {counted(shown.damaged, 'damaged frame')} stand where an answer was overdue"
     tally = together(seen.stations[unit].late for unit in shown.late)
-    yield tally.found(RULES["MB107"], MASTER, words, note_if(seen.rare(shown.in_vain, seen.requests)))
+    yield tally.found(RULES["MB107"], MASTER, words, note_if(seen.rare(shown.in_vain, seen.requests, tally)))
 
 
 def _heard(seen: BusRecord) -> dict[int, Heard]:

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from dissectors import busiest
-from dissectors.findings import EVIDENCE_MAX, Finding, Severity, Tally, counted, found, times
+from dissectors.findings import EVIDENCE_MAX, Finding, Severity, Tally, counted, found, times, together
 from dissectors.frame import Flaw
 from dissectors.late_speakers import reaching
 from dissectors.line import MS
@@ -131,7 +130,7 @@ def of_missing(seen: BusRecord, unit: int, station: StationRecord, is_scanned: b
             left -= away.count
     if left > 0:
         words = f"no answer to {left} of {counted(station.asked, 'request')}"
-        words += busiest.words(missing.quarters, left, station.asked, seen.span)
+        words += seen.when(missing, station.asked, left)
         finding = missing.found(RULES["MB002"], name, words, note_if(seen.rare(left, station.asked, missing)))
         yield replace(finding, count=left)
 
@@ -191,7 +190,7 @@ def _damaged(seen: BusRecord, unit: int, station: StationRecord, is_common: bool
     words += f" ({', '.join(details)})" if details else ""
     if station.asked >= 20:
         words += f"; that is {share_words(damaged.count, station.asked)} of all, with 95% confidence"
-    words += busiest.words(damaged.quarters, damaged.count, station.asked, seen.span)
+    words += seen.when(damaged, station.asked)
     finding = damaged.found(RULES["MB005"], name, words, note_if(rare or is_common))
     finding = of_few(finding) if damaged.count < _SYSTEM_LEAST else finding
     if (longer := station.talked_over.count - station.cut) > 1 and 2 * longer >= damaged.count:
@@ -251,7 +250,12 @@ def _flawed(seen: BusRecord, name: str, station: StationRecord) -> Iterator[Find
         words = f"{count} of {counted(station.asked, 'answer')} good but for one thing: {flaw.value}"
         if count == station.damaged.count == station.asked:
             words += ", every time"
-        flawed = replace(tally.found(RULES[code], name, words, note_if(seen.rare(count, station.asked))), count=count)
+        flawed = replace(
+            tally.found(
+                RULES[code], name, words, note_if(seen.rare(count, station.asked, together(one for _, one in parts)))
+            ),
+            count=count,
+        )
         # the first of a habit is not put right
         is_always = count >= station.damaged.count - 1 and station.damaged.count == station.asked
         yield without_check(flawed, flaw) if is_always else flawed
@@ -279,10 +283,10 @@ def _exceptions(seen: BusRecord, name: str, unit: int, station: StationRecord) -
         if code in _NOT_THERE and request is not None and _PROBED * request.tries <= station.turns:
             tried.setdefault(code, []).append((key, tally))
         else:
-            yield _exception(name, station, key, code, tally, seen.maker_words(unit, code))
+            yield _exception(seen, unit, key, code, tally)
     for code, probes in tried.items():
         key, tally = probes[0]
-        finding = _exception(name, station, key, code, tally, seen.maker_words(unit, code))
+        finding = _exception(seen, unit, key, code, tally)
         further = f", and to {counted(len(probes) - 1, 'other request')}" if len(probes) > 1 else ""
         words = f"{finding.seen}{further}; hardly asked beside what is polled"
         evidence = tuple(sorted(no for _, one in probes for no in one.evidence))
@@ -291,16 +295,16 @@ def _exceptions(seen: BusRecord, name: str, unit: int, station: StationRecord) -
         yield replace(made, last=max(one.last for _, one in probes), means=finding.means, next=finding.next)
 
 
-def _exception(name: str, station: StationRecord, key: Key, code: int, tally: Tally, maker: str) -> Finding:
-    """`maker`: what the manual of the device says of the code; it stands before the standard."""
+def _exception(seen: BusRecord, unit: int, key: Key, code: int, tally: Tally) -> Finding:
+    """What the manual of the device says of the code stands before the standard."""
+    maker, request = seen.maker_words(unit, code), seen.stations[unit].requests.get(key)
     otherwise = MAKER_EXCEPTION if maker else VENDOR_EXCEPTION
     severity, means, following = otherwise if maker and code not in USED_ALIKE else EXCEPTIONS.get(code, otherwise)
     meaning = maker or EXCEPTION_NAMES.get(code) or "a code of the vendor's"
-    request = station.requests.get(key)
     of = tally.count if request is None else request.tries
     some = "the only request" if of == 1 else f"{tally.count} of {of} requests"
-    words = f"exception {code_number(code)} ({meaning}) to {some} to {request_words(key)}"
-    return replace(tally.found(RULES["MB008"], name, words, severity), means=means, next=following)
+    words = f"exception {code_number(code)} ({meaning}) to {some} to {request_words(key)}{seen.when(tally, of)}"
+    return replace(tally.found(RULES["MB008"], f"station {unit}", words, severity), means=means, next=following)
 
 
 def _times(
@@ -330,8 +334,9 @@ def _times(
     if station.late.count:
         words = f"{counted(station.late.count, 'answer')} came after the master had given up"
         waits = f"; it waits {fine_milliseconds(timeout)}" if timeout is not None else ""
-        severity = note_if(seen.rare(station.late.count, station.asked))
-        yield reaching(station.late.found(RULES["MB103"], name, words + waits, severity), seen.late_speakers)
+        words += waits + seen.when(station.late, station.asked)
+        severity = note_if(seen.rare(station.late.count, station.asked, station.late))
+        yield reaching(station.late.found(RULES["MB103"], name, words, severity), seen.late_speakers)
     if station.answered and station.repeats.count:
         share = station.repeats_cost / seen.span
         words = (

@@ -18,7 +18,8 @@ def of_unheard(seen: BusRecord, unheard: Sequence[int]) -> Iterator[Finding]:
     if not unheard:
         return
     stations = [seen.stations[unit] for unit in unheard]
-    count, asked = sum(one.missing.count for one in stations), sum(one.asked for one in stations)
+    missing, asked = together(one.missing for one in stations), sum(one.asked for one in stations)
+    count = missing.count
     if seen.hears_nobody and len(stations) > 1:
         words = (
             f"no answer heard from anybody: {counted(count, 'request')} to {units(unheard)}, none of them sent again"
@@ -29,8 +30,9 @@ def of_unheard(seen: BusRecord, unheard: Sequence[int]) -> Iterator[Finding]:
             f"no answer heard to {count} of {counted(asked, 'request')} to {units(unheard)}; the master went on as "
             "after an answer, neither waiting nor asking again"
         )
-        severity = note_if(seen.rare(count, asked))
-    finding = together(one.missing for one in stations).found(RULES["MB020"], "bus", words, severity)
+        words += seen.when(missing, asked)
+        severity = note_if(seen.rare(count, asked, missing))
+    finding = missing.found(RULES["MB020"], "bus", words, severity)
     never = [unit for unit in unheard if seen.stations[unit].last_heard is None]
     if never and not seen.hears_nobody:  # nothing that it sent proves that it is there
         finding = replace(finding, means=f"{_NOT_HEARD}; or {units(never)} off, of a master that waits no longer")
