@@ -197,6 +197,24 @@ def test_answers_that_nobody_can_take_are_found_in_tables_as_row_by_row() -> Non
         same(by_tables(items, judged(session), dice, most), expected)
 
 
+def test_routers_are_known_in_tables_as_row_by_row() -> None:
+    """Who passes on what comes from a network, message by message, through one router or two."""
+    dice, steps = random.Random(4), rounds(3, 2, 5, 9)
+    for no in range(60):
+        router, network, routed = dice.choice((2, 5)), dice.choice((7, 8, 9)), dice.random() < 0.5
+        told = f"0128ffff0000{network:02x}01{no:02x}fe1008" if routed else f"010800{network:02x}01{no:02x}1008"
+        router = 9 if network == 7 else router
+        steps += [(2, data(router, 255, told if no % 20 else f"01801300{router:02x}01")), *rounds(1, 2, 5, 9)]
+    session = Session("x", bulk_mstp.LINE, "mstp")
+    items = list(tables([Block(reads_of(chunks_of(steps)))], session))
+    expected = by_rows(items, judged(session))
+    assert sorted(one.code for one in expected.findings() if one.code in ("MS310", "MS314")) == 2 * ["MS310"] + [
+        "MS314"
+    ]
+    for most in (1 << 30, 1, 3, 20):
+        same(by_tables(items, judged(session), dice, most), expected)
+
+
 def test_who_answered_in_a_run_is_known_to_answer() -> None:
     """Who asked it goes on 200 ms later, sooner than it may give up: it had the answer, which was not heard."""
     asked, acked = bytes.fromhex("01040275000c0c000000041955"), bytes.fromhex("010020000c")

@@ -332,6 +332,17 @@ def two_ways_to_one_network() -> list[Step]:
     return [*once, (2, token(6, 20)), (2, token(20, 4))] * 3 + rounds(3, 4, 6, 20)
 
 
+def two_routers_and_numbers() -> list[Step]:
+    """4 and 6 both pass on what comes from network 2001, broadcasts too, and say that this network is 5 and 9."""
+    steps: list[Step] = []
+    for hops in (254, 253, 254):
+        from_there = f"0128ffff0007d10105{hops:02x}1008"
+        steps += [*rounds(3, 4, 6, 20), (2, data(4, 255, from_there)), (2, data(4, 255, "018013000501"))]
+        steps += [(2, token(4, 6)), (2, data(6, 255, from_there)), (2, data(6, 255, "018013000901"))]
+        steps += [(2, token(6, 20)), (2, token(20, 4))]
+    return steps + rounds(3, 4, 6, 20)
+
+
 def answers_elsewhere() -> list[Step]:
     """12 sends its answers to everybody; 3 takes that for another token and lets go of its own, as it must."""
     steps: list[Step] = []
@@ -402,6 +413,7 @@ MADE = {
     "ms-tp-polls-beyond-its-successor": polls_astray,
     "ms-tp-two-routers-to-one-network": two_ways_to_one_network,
     "ms-tp-token-to-itself-behind-an-adapter": token_to_itself,
+    "ms-tp-two-routers-pass-on-from-one-network": two_routers_and_numbers,
     "ms-tp-answers-to-another-address": answers_elsewhere,
     "ms-tp-answers-with-another-number": answers_with_another_number,
     "ms-tp-never-uses-its-token": never_uses_it,
