@@ -34,6 +34,16 @@ def duration(value: int) -> str:
     return f"{_three_digits(seconds)} s" if value < _MINUTES_FROM else f"{_three_digits(seconds / 60)} min"
 
 
+def elapsed(value: int) -> str:
+    """A time since a begin, ns, by which a moment is found: "123.4 s", from five minutes on "9 h 10 min 5 s"."""
+    if value < _MINUTES_FROM:
+        return f"{value / NS_PER_S:.1f} s"
+    minutes, seconds = divmod(round(value / NS_PER_S), 60)
+    hours, minutes = divmod(minutes, 60)
+    parts = ((hours, "h"), (minutes, "min"), (seconds, "s"))
+    return " ".join(f"{count} {unit}" for count, unit in parts if count)
+
+
 def exact_duration(value: float, unit: int) -> str:
     """A duration in ns as a bare number of units of so many ns, with all its digits: "8.2"."""
     if not isinstance(value, int):

@@ -9,6 +9,7 @@ from dissectors.bacnet.ring import Ring, RingNode, lies_between
 from dissectors.bacnet.ring_remarks import Remark, listed, plain
 from dissectors.bacnet.rules import RULES
 from dissectors.findings import as_consequence
+from dissectors.words import elapsed
 
 SKIPPED_ROUNDS = 20
 """So many tokens past a station that is in the ring, and not one poll to it, are no accident."""
@@ -42,7 +43,7 @@ def _shut_out(ring: Ring, mac: int, node: RingNode, by: int, following: int, rou
     polled = sorted(
         address for (source, address), time in ring.polled.items() if source == by and time > node.last_token
     )
-    first = "" if ring.first is None else f" {(node.last_token - ring.first) / 1e9:.2f} s into the capture"
+    first = "" if ring.first is None else f" {elapsed(node.last_token - ring.first)} into the capture"
     seen = (
         f"got its last token{first}; since then {rounds} rounds without a token or a poll for it: "
         f"MAC {by} passes the token on to MAC {following} and polls "

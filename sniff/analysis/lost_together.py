@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from dissectors.findings import Finding, Severity, Tally, counted
 from dissectors.line import NS_PER_S
 from dissectors.tracker import PASSING, Transaction, Verdict
-from dissectors.words import duration
+from dissectors.words import duration, elapsed
 from sniff.analysis.line_rules import LINE_RULES as RULES
 
 if TYPE_CHECKING:
@@ -146,11 +146,11 @@ class LostTogether:
         window = max(loss[1] for loss in together) - min(loss[0] for loss in together)
         is_one = window < MOMENT or not self._has_times
         when = "at the same moment" if is_one else f"within {duration(window)}"
-        when += f", {(moment - first) / NS_PER_S:.1f} s after the begin" if self._has_times else ""
+        when += f", {elapsed(moment - first)} after the begin" if self._has_times else ""
         seen = f"{len(names)} stations ({', '.join(map(str, names))}) stopped answering {when}: {who}"
         back = [loss[2] for loss in together if loss[2]]
         if len(back) == len(together):
-            after = f" after {(max(back) - moment) / NS_PER_S:.1f} s" if self._has_times else ""
+            after = f" after {elapsed(max(back) - moment)}" if self._has_times else ""
             seen += f"; they were back{after}"
         severity = Severity.WARNING if back else Severity.ERROR
         finding = tally.found(RULES["LN305"], "bus", seen, severity)

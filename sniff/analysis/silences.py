@@ -10,7 +10,7 @@ from dissectors.findings import Finding, Tally
 from dissectors.frame import Event
 from dissectors.histogram import Histogram
 from dissectors.line import MS, NS_PER_S
-from dissectors.words import duration
+from dissectors.words import duration, elapsed
 from sniff.analysis.line_rules import LINE_RULES as RULES
 
 if TYPE_CHECKING:
@@ -132,11 +132,11 @@ class Silences:
         for begin, _, row in whole:
             tally.add(begin, row, row + 1)
         longest = max(end - begin for begin, end, _ in whole)
-        at = ", ".join(f"{(begin - (self.first or 0)) / NS_PER_S:.1f} s" for begin, _, _ in whole[:SILENT_SHOWN])
+        at = ", ".join(elapsed(begin - (self.first or 0)) for begin, _, _ in whole[:SILENT_SHOWN])
         at += f" … ({len(whole)} times in all)" if len(whole) > SILENT_SHOWN else ""
         most, often = "up to " if len(whole) > 1 else "", longest // max(usual, MS)
         seen = (
-            f"not one octet for {most}{longest / NS_PER_S:.1f} s, {often} times as long as pauses are here; from {at} "
+            f"not one octet for {most}{elapsed(longest)}, {often} times as long as pauses are here; from {at} "
             "on, and everything went on as before"
         )
         yield tally.found(RULES["LN304"], "bus", seen)

@@ -16,7 +16,7 @@ from dissectors.columns import Masks, Times
 from dissectors.findings import Finding, as_consequence, counted, found, from_the_root
 from dissectors.line import MS, NS_PER_S
 from dissectors.subject import About, Subject
-from dissectors.words import milliseconds
+from dissectors.words import elapsed, milliseconds
 from sniff.analysis.site_ear import AnsweredExchanges, HeardFrames, Keys, SiteEar
 from sniff.analysis.site_rules import SITE
 from sniff.analysis.site_rules import SITE_RULES as RULES
@@ -132,11 +132,9 @@ def _stop(heard: Sequence[SiteBus], stops: Sequence[Stop]) -> tuple[Finding, int
     said = []
     for bus, stop in zip(heard, stops, strict=True):
         what = "silent" if not stop.stations else f"{counted(len(stop.stations), 'station')} lost"
-        later = "not back" if stop.back is None else f"back after {(stop.back - at) / NS_PER_S:.1f} s"
+        later = "not back" if stop.back is None else f"back after {elapsed(stop.back - at)}"
         said.append(f"{bus.name}: {what}, {later}")
-    seen = (
-        f"{len(heard)} buses stopped at one moment, {(at - first) / NS_PER_S:.1f} s after the begin: {'; '.join(said)}"
-    )
+    seen = f"{len(heard)} buses stopped at one moment, {elapsed(at - first)} after the begin: {'; '.join(said)}"
     rule = RULES["SB001"]
     severity = rule.severity if len(backs) == len(stops) else type(rule.severity).ERROR
     finding = found(rule, _site(), seen, first=at, last=until, count=1, severity=severity)
@@ -154,7 +152,7 @@ def _unplugged(buses: Sequence[SiteBus]) -> Iterator[tuple[Finding, int, int]]:
         if len(names) < 2:
             continue
         begin = min((bus.first for bus in buses if bus.first is not None), default=at)
-        when = f"{max(0, at - begin) / NS_PER_S:.1f} s after the begin"
+        when = f"{elapsed(max(0, at - begin))} after the begin"
         seen = f"the ports of {len(names)} buses ({', '.join(names)}) went away at one moment, {when}"
         finding = found(RULES["SB002"], _site(), seen, first=at, last=together[-1][0], count=1)
         yield finding, at, max(bus.last or at for bus in buses)

@@ -19,7 +19,7 @@ from dissectors.findings import Finding, Tally, counted, found
 from dissectors.frame import Chunk, Event, Frame, LineError
 from dissectors.line import MS, NS_PER_S
 from dissectors.tracker import Transaction
-from dissectors.words import milliseconds, percent
+from dissectors.words import elapsed, milliseconds, percent
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.lost_together import LostTogether
 from sniff.analysis.other_settings import Fit, what_fits
@@ -125,7 +125,9 @@ class TimePatterns:
         self._struck: Counter[str] = Counter()  # senders of what is disturbed
         self._apart: Counter[int] = Counter()  # ms from disturbance to disturbance
         # bursts
-        self._bursts: list[_Burst] = []
+        self._burst: _Burst | None = None  # the newest, which may go on
+        self._bursts: list[_Burst] = []  # those before it
+        self._only_strong = False  # weak ones were too many to keep
         self._rounds = Rounds()
         self._bouts = Bouts()
         # stretches that cannot be read
@@ -237,20 +239,30 @@ class TimePatterns:
             lock.others += complex(np.exp(2j * math.pi * ((since % period) / period)).sum())
 
     def _see_trouble(self, no: int, event: Event, sender: str) -> None:
-        bursts = self._bursts
+        burst = self._burst
         marked = sum(bool(mark.error & _MARKS) for mark in event.marks)
         struck = max(1, marked)
-        if bursts and event.start - bursts[-1].last < QUIET:
-            burst = bursts[-1]
+        if burst is not None and event.start - burst.last < QUIET:
             burst.last = max(burst.last, event.end)
             burst.struck += struck
             burst.marked |= marked > 0
             if len(burst.senders) < 8:
                 burst.senders.add(sender)
-        elif len(bursts) < BURSTS_KEPT:
+        else:
+            self._keep(burst)
             octets = event.octets[:BURST_OCTETS]
-            bursts.append(_Burst(event.start, event.end, {sender}, [no], self._good_since, struck, marked > 0, octets))
+            self._burst = _Burst(event.start, event.end, {sender}, [no], self._good_since, struck, marked > 0, octets)
             self._good_since = 0
+
+    def _keep(self, burst: _Burst | None) -> None:
+        """A burst is over. Where there are too many, single errors are none."""
+        bursts = self._bursts
+        if burst is None or len(bursts) >= BURSTS_KEPT or (self._only_strong and burst.struck < STRONG):
+            return
+        bursts.append(burst)
+        if len(bursts) == BURSTS_KEPT and not self._only_strong:
+            self._only_strong = True
+            self._bursts = [one for one in bursts if one.struck >= STRONG]
 
     def _see_unreadable(self, no: int, event: Event) -> None:
         stretch = self._stretch
@@ -334,10 +346,11 @@ class TimePatterns:
 
     def _in_bursts(self) -> Iterator[Finding]:
         """All bursts; where single errors lie between them, those of several."""
-        if len(self._bursts) >= BURSTS_KEPT:
+        bursts = self._bursts if self._burst is None else [*self._bursts, self._burst]
+        if len(bursts) >= BURSTS_KEPT:
             return
-        for least in (1, STRONG):
-            finding = self._steady([burst for burst in self._bursts if burst.struck >= least])
+        for least in (STRONG,) if self._only_strong else (1, STRONG):
+            finding = self._steady([burst for burst in bursts if burst.struck >= least])
             if finding is not None:
                 yield finding
                 return
@@ -367,7 +380,7 @@ class TimePatterns:
         longest = max(burst.last - burst.first for burst in bursts)
         seen = (
             f"{counted(len(bursts), 'burst')} of damage or noise, {steady} of {len(intervals)} intervals within "
-            f"{STEADY:.0%} of {usual / NS_PER_S:.1f} s, each {milliseconds(longest)} at most"
+            f"{STEADY:.0%} of {elapsed(usual)}, each {milliseconds(longest)} at most"
         )
         seen += "; it strikes whoever sends" if struck else "; with line errors, and no two alike"
         return tally.found(RULES["LN302"], "bus", seen)
@@ -390,9 +403,7 @@ class TimePatterns:
         if not told:
             return
         first = told[0][0]
-        spans = ", ".join(
-            f"{(one.first - begin) / NS_PER_S:.1f} … {(one.last - begin) / NS_PER_S:.1f} s" for one, _ in told
-        )
+        spans = ", ".join(_span(one.first - begin, one.last - begin) for one, _ in told)
         octets = sum(one.octets for one, _ in told)
         seen = f"{octets} octets and not one good frame at {spans}, good frames otherwise; {told[0][1]}"
         finding = found(
@@ -423,6 +434,13 @@ class TimePatterns:
                 return f"{marked} of them have line errors: another baud rate or format"
             return f"{marked} of them are in reads with line errors: another baud rate or format{_OR_TWO}"
         return ""
+
+
+def _span(begin: int, end: int) -> str:
+    """From when to when, ns since the begin of the capture: "12.0 … 14.5 s", "1 h 2 min … 1 h 5 min"."""
+    first, last = elapsed(begin), elapsed(end)
+    same = first.endswith(" s") and " " not in first.removesuffix(" s") and "." in last
+    return f"{first.removesuffix(' s') if same else first} … {last}"
 
 
 _OR_TWO = ", or two that talk at once, all the time"

@@ -7,7 +7,7 @@ import pytest
 from dissectors.line import MS, NS_PER_S
 from dissectors.modbus.finding_words import share_words
 from dissectors.register_maps import Mapped, RegisterMap, document
-from dissectors.words import brief, exact_duration, percent
+from dissectors.words import brief, elapsed, exact_duration, percent
 
 
 @pytest.mark.parametrize(
@@ -31,6 +31,17 @@ def test_no_number_is_a_power_of_ten(value: float, most: int, said: str) -> None
 )  # fmt: skip
 def test_some_is_not_none_and_not_all(share: float, places: int, said: str) -> None:
     assert percent(share, places) == said
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [
+        (0, "0.0 s"), (299.9, "299.9 s"), (300, "5 min"), (33_000.1, "9 h 10 min"), (3_600, "1 h"),
+        (3_725, "1 h 2 min 5 s"), (7_199.7, "2 h"), (100_000, "27 h 46 min 40 s"),
+    ],
+)  # fmt: skip
+def test_a_moment_of_a_night_is_no_number_of_seconds(seconds: float, said: str) -> None:
+    assert elapsed(round(seconds * NS_PER_S)) == said
 
 
 def test_a_duration_in_words_is_exact() -> None:

@@ -169,6 +169,18 @@ def test_a_contactor_shows_among_single_errors() -> None:
     assert "LN302" in patterns(Case("", partial(FIVE, faults), (), seconds=90))
 
 
+def test_bursts_of_a_night_show_among_many_single_errors() -> None:
+    told, dice = TimePatterns(Session("x", LineSettings.parse("38400,8N1"), "modbus-rtu")), random.Random(1)
+    rows = [(at * 600 * S + k * 30 * MS, f"station {k}", False) for at in range(1, 31) for k in range(1, 5)]
+    rows += [(dice.randrange(18_000) * S + 90 * MS, f"station {at % 5}", False) for at in range(600)]
+    rows += [(at * 2 * S + 500 * MS, "master", True) for at in range(9_000)]
+    for no, (start, sender, is_good) in enumerate(sorted(rows), 1):
+        check, damage = (Check.GOOD, None) if is_good else (Check.BAD, Damage.CHECK)
+        told.see(no, Frame("x", no.to_bytes(4), start, start + MS, check, FoundBy.GAP, damage), sender)
+    found = [one for one in told.findings() if one.code == "LN302"]
+    assert [("of 10 min," in one.seen) for one in found] == [True]
+
+
 def test_a_master_that_stops_for_some_seconds() -> None:
     assert patterns(Case("", modbus, (), hear=partial(paused, ((20.0, 4.0),)))) == {"LN304"}
     assert patterns(Case("", modbus, (), hear=partial(paused, ((20.0, 1.0),)))) == set()
