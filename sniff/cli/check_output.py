@@ -8,6 +8,8 @@ from array import array
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Rule, Severity, merged, times, under_causes
@@ -19,6 +21,7 @@ from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.site_rules import SITE_RULES
 from sniff.analysis.wording import station_word
 from sniff.bus.row_words import iso, since_start
+from sniff.cli.consequences import folded
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 
@@ -118,12 +121,14 @@ def write_text(checked: Sequence[Checked], colour: bool) -> None:
         if number:
             print()
         _write_head(one, width)
-        for finding, under in under_causes(one.findings):
-            if under:
-                _write_consequence(one, finding, width)
+        for is_under, findings in groupby(under_causes(one.findings), key=itemgetter(1)):
+            if is_under:
+                for who, finding in folded(finding for finding, _ in findings):
+                    _write_consequence(one, who, finding, width)
                 continue
-            print()
-            _write_finding(one, finding, width, colour)
+            for finding, _ in findings:
+                print()
+                _write_finding(one, finding, width, colour)
         print()
         print(_count_words(one.findings))
     is_one_bus = len({one.session.bus for one in checked}) == 1 and not any(one.buses for one in checked)
@@ -200,9 +205,11 @@ def when(one: Checked, finding: Finding) -> str:
     return f"{first} … {last[11:] if first[:10] == last[:10] else last} UTC"
 
 
-def _write_consequence(one: Checked, finding: Finding, width: int) -> None:
-    """What a finding above most likely explains: one paragraph under it; what to do stands there."""
-    words = f"└ {finding.subject}: {_title(one, finding)}  [{finding.code}]  {sentence(finding.seen)}"
+def _write_consequence(one: Checked, who: str, finding: Finding, width: int) -> None:
+    """What a finding above most likely explains: one paragraph under it; what to do stands there. `who`: of whom, the
+    finding is that of one of them."""
+    seen = finding.seen if who == finding.subject else f"most at {finding.subject}: {finding.seen}"
+    words = f"└ {who}: {_title(one, finding)}  [{finding.code}]  {sentence(seen)}"
     _paragraph(words, width, _INDENT, _INDENT + "  ")
 
 

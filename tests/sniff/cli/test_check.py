@@ -76,7 +76,7 @@ def test_consequences_stand_under_their_cause(two_masters, capsys):
     assert main(["check", two_masters]) == 1
     lines = capsys.readouterr().out.splitlines()
     cause = next(number for number, line in enumerate(lines) if "[MB203]" in line)
-    assert any(line.startswith("         └ station") for line in lines[cause : cause + 12])
+    assert any(line.startswith("         └ 3 stations (") for line in lines[cause : cause + 12])
     main(["check", two_masters, "--json"])
     found = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     cause = next(number for number, one in enumerate(found) if one["code"] == "MB203")
