@@ -12,6 +12,9 @@ NS_PER_S = 1_000_000_000
 MS = 1_000_000
 """ns in a millisecond."""
 
+SLOWEST, FASTEST = 50, 12_000_000
+"""bit/s; the fastest is that of PROFIBUS (IEC 61158-2)."""
+
 _TOKEN = re.compile(r"(?P<baud>\d{2,8})(?:,(?P<data>[5-8])(?P<parity>[NEOMS])(?P<stop>1\.5|1|2))?", re.IGNORECASE)
 
 
@@ -19,7 +22,7 @@ _TOKEN = re.compile(r"(?P<baud>\d{2,8})(?:,(?P<data>[5-8])(?P<parity>[NEOMS])(?P
 class LineSettings:
     """Baud rate and character format of a line.
 
-    `baud`: bit/s, 50 … 10 000 000. `data_bits` 5 … 8. `parity` one of N E O M S. `stop_bits` 1, 1.5 or 2.
+    `baud`: bit/s, SLOWEST … FASTEST. `data_bits` 5 … 8. `parity` one of N E O M S. `stop_bits` 1, 1.5 or 2.
     """
 
     baud: int = 9600
@@ -39,8 +42,8 @@ class LineSettings:
                 f"line settings {token!r}: expected baud rate, data bits, parity (N E O M S) and stop bits as 19200,8E1"
             )
         baud = int(match["baud"])
-        if not 50 <= baud <= 10_000_000:
-            raise ValueError(f"line settings {token!r}: baud rate {baud} is outside 50 … 10000000")
+        if not SLOWEST <= baud <= FASTEST:
+            raise ValueError(f"line settings {token!r}: baud rate {baud} is outside {SLOWEST} … {FASTEST}")
         if match["data"] is None:
             return cls(baud)
         return cls(baud, int(match["data"]), match["parity"].upper(), float(match["stop"]))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dissectors.line import NS_PER_S, LineSettings
+from dissectors.line import FASTEST, NS_PER_S, SLOWEST, LineSettings
 from sniff.formats.uart import FRAMING, Characters, Decoder, Uart
 from sniff.formats.usual_rates import USUAL
 
@@ -124,7 +124,7 @@ def _measured(edges: Times, best: Candidate) -> float:
 def _line(found: Candidate, bit: float) -> LineSettings:
     rate = NS_PER_S / bit
     nearest = min(USUAL, key=lambda usual: abs(usual / rate - 1))
-    baud = nearest if abs(nearest / rate - 1) <= _SAME_RATE else max(50, min(10_000_000, round(rate)))
+    baud = nearest if abs(nearest / rate - 1) <= _SAME_RATE else max(SLOWEST, min(FASTEST, round(rate)))
     width, characters = found.uart.width, found.characters
     good = characters.bits[characters.errors & FRAMING == 0]
     ones = (good[:, None] >> np.arange(width) & 1).sum(axis=1) & 1

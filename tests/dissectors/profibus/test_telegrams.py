@@ -159,3 +159,8 @@ def test_a_stray_octet_in_front_of_the_answer_is_no_acknowledgement() -> None:
     assert [one.octets for one in read(asked, b"\xe5" + answer)] == [asked, answer]
     assert [one.octets for one in read(asked, b"\xe5\x55" + answer)] == [asked, answer]
     assert [one.octets for one in read(asked, b"\xe5", telegram(9, 2, 0x5D, b"\1"))][1] == b"\xe5"
+
+
+def test_every_rate_of_a_bus_can_be_named() -> None:
+    rates = (9600, 19_200, 45_450, 93_750, 187_500, 500_000, 1_500_000, 3_000_000, 6_000_000, 12_000_000)
+    assert [LineSettings.parse(f"{rate},8E1").baud for rate in rates] == list(rates)
