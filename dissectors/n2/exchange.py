@@ -39,6 +39,7 @@ class Exchange:
     gap: int | None = None  # ns from the end of the same command before it, where it is that one again
     echoed: bool = False
     waited: int = GIVE_UP  # ns, until the master went on
+    waits: int = 0  # ns that it waits at least: as long as for one whose late answer it took for this one's
     known_answers: int = 0  # of its station when it was closed without one
 
     @property

@@ -2,7 +2,8 @@
 
 1. One master, one open command. A good answer belongs to the open one, unless it rather answers one before it that had
    none: it has a form that the open one does not ask for and the one before does, or comes sooner than the station of
-   the open one ever answered. Then it is late, and the open command stays open.
+   the open one ever answered, or that station was never heard and the one before is there. Then it is late, and the
+   open command stays open.
 2. A damaged answer leaves the command open: it may have been junk, and a good one come yet. So damage alone is never a
    second answer.
 3. A command closes the one before it: no response, or a damaged answer where one came, or octets that may be one.
@@ -163,7 +164,7 @@ class N2Tracker:
                 return self._echo(no, frame, header.role, open_, closed)
         self._see_pause(frame.start)
         if open_ is not None:
-            open_.waited = frame.start - open_.end
+            open_.waited = max(frame.start - open_.end, open_.waits)
             closed.append(self._close_unanswered(open_))
         station = header.destination if header.ok or frame.repair is not None else self._station_of(octets, header)
         if station is not None and header.ok:
@@ -240,6 +241,7 @@ class N2Tracker:
         owing = self._owed_rather(open_, frame)
         if owing is not None:
             self._forget(owing)
+            open_.waits = max(open_.waits, owing.waited)
             return self._separate(no, frame, header, Verdict.LATE, owing, closed)
         missed = self._missed
         perhaps_late = missed is not None and missed.is_owed and missed.station != open_.station
@@ -266,13 +268,20 @@ class N2Tracker:
         times = self._times.get(open_.station) if open_.station is not None else None
         latest = self._since(open_, frame).high
         soon = times is not None and times.count >= FEW and 2 * latest < times.least
-        if not (formless or soon):
+        if not (formless or soon or self._is_anothers(open_)):
             return None
         candidates = [e for e in self._within(frame.start) if e.is_owed and (e.octets != open_.octets or not formless)]
         if self._missed is not None and self._missed not in candidates and self._missed.bad is None:
             candidates.append(self._missed)
         same = [exchange for exchange in candidates if exchange.station == open_.station]
-        return best_owed(same, frame) or best_owed(candidates, frame)
+        return best_owed(same, frame) or self._best(candidates, frame)
+
+    def _is_anothers(self, open_: Exchange) -> bool:
+        """Whether it is to a station never heard, and the one before it to one that is there and owes an answer."""
+        missed = self._missed
+        if missed is None or missed.station == open_.station or not missed.is_owed or open_.station in self._times:
+            return False
+        return missed.station in self._times
 
     def _within(self, now: int) -> list[Exchange]:
         """Commands that had no good answer and may still get one: a station answers in order."""
@@ -322,7 +331,7 @@ class N2Tracker:
         if done is not None:
             owed = [] if again and self._doubles[done.station] >= _DOUBLES else self._within(frame.start)
             same = [exchange for exchange in owed if exchange.station == done.station]
-            owing = best_owed(same, frame) or best_owed(owed, frame) or self._crossed(owed, done, frame)
+            owing = best_owed(same, frame) or self._best(owed, frame) or self._crossed(owed, done, frame)
             owing = owing or next((exchange for exchange in owed if not exchange.is_owed), None)
             if owing is not None:
                 self._forget(owing)
@@ -343,7 +352,11 @@ class N2Tracker:
         """A command that the answer before this one rather answered, if this one may answer the last command."""
         if not may_answer(parse_command(done.octets), frame.octets):
             return None
-        return best_owed(owed, replace(frame, octets=done.answer))
+        return self._best(owed, replace(frame, octets=done.answer))
+
+    def _best(self, owed: list[Exchange], frame: Frame) -> Exchange | None:
+        """The command that an answer belongs to: rather one to a station that is heard than to one that hardly was."""
+        return best_owed([one for one in owed if self._answers_of(one) >= FEW], frame) or best_owed(owed, frame)
 
     def _separate(
         self,

@@ -81,6 +81,15 @@ _ALL_OF_N2 = N2(
     faults=(LateResponse(0.2, 195 * MS, tuple(f"drive {unit}" for unit in _FOUR)),),
 )
 
+_BESIDE_DEAD = N2(
+    partial(by_turns, 40, 5, 80, count=2),
+    {"drive 40": partial(follower, 40, 18 * MS), "drive 5": partial(follower, 5, 4 * MS)},
+    timeout=1000 * MS,
+    retries=0,
+    faults=(LateResponse(0.3, 1009 * MS, ("drive 40",)),),
+)
+"""What comes late from one falls into the wait for another that is dead: an N2 answer names nobody."""
+
 LATE_CASES: tuple[Case, ...] = (
     _case("RTU answers into the next station, no repeats", _bus(240, retries=0)),
     _case("N2 answers into the next station", _n2(250, 15)),
@@ -90,6 +99,14 @@ LATE_CASES: tuple[Case, ...] = (
 )
 
 FURTHER_LATE_CASES: tuple[Case, ...] = (
+    Case(
+        "N2 slow station beside a dead one",
+        _BESIDE_DEAD,
+        (("N2005", "station 80"), Said(("station 40",), ("N2011", "N2014"))),
+        seconds=160,
+        seeds=3,
+        never=("N2017",),
+    ),
     Case(
         "RTU now and then answers into the next request, FTDI",
         _SELDOM,
