@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from dissectors import registry
@@ -14,32 +15,35 @@ from sniff.formats import pcap, pcapng
 from sniff.formats.linktypes import USERS, link_type_for
 from sniff.formats.records import FrameFile
 
-MICROSECONDS = "microseconds"
-"""Option of .pcap: times as readers that know no nanoseconds want them."""
+
+@dataclass(frozen=True, slots=True)
+class PacketOptions:
+    """What only packet files have. `link_type`: of their frames, None for the usual one. `microseconds`: .pcap: times
+    as readers that know no nanoseconds want them. `notes`, `marks`: by row number, what is said in the comments of
+    packets, where the format has such, and what a person wrote about them."""
+
+    link_type: int | None = None
+    microseconds: bool = False
+    notes: Mapping[int, str] = field(default_factory=dict)
+    marks: Mapping[int, str] = field(default_factory=dict)
 
 
-def create(
-    path: str | Path,
-    session: Session,
-    options: Mapping[str, str] | None = None,
-    notes: Mapping[int, str] | None = None,
-    marks: Mapping[int, str] | None = None,
-) -> CaptureWriter:
-    """Create a capture by its suffix. `options` are the format's own ("link-type" of packet files); `notes`, by row
-    number, are said in the comments of packets where the format has such, and `marks`, what a person wrote about them.
-    Raises CaptureError."""
+PLAIN = PacketOptions()
+
+
+def create(path: str | Path, session: Session, packets: PacketOptions = PLAIN) -> CaptureWriter:
+    """Create a capture by its suffix. Raises CaptureError."""
     if formats.keeps_frames(path):
-        link_type = _link_type(path, session, (options or {}).get("link-type"))
+        link_type = _link_type(path, session, packets.link_type)
         file = (
             pcap.create(Path(path), session, link_type, microseconds=True)
-            if options is not None and MICROSECONDS in options
+            if packets.microseconds
             else formats.create_of_frames(path, session, link_type)
         )
-        return FrameWriter(
-            file, RecordMaker(session, link_type, notes=notes, marks=marks), _not_dissected(session.protocol, link_type)
-        )
-    if options:
-        raise CaptureError(f"{path}: this format has no option {', '.join(options)}")
+        maker = RecordMaker(session, link_type, notes=packets.notes, marks=packets.marks)
+        return FrameWriter(file, maker, _not_dissected(session.protocol, link_type))
+    if packets.link_type is not None:
+        raise CaptureError(f"{path}: this format has no link type; .pcap and .pcapng have")
     return formats.create_of_items(path, session)
 
 
@@ -50,9 +54,9 @@ def live_pcapng(path: str | Path, session: Session) -> FrameWriter:
     return FrameWriter(pcapng.create(Path(path), session, link_type, live=True), RecordMaker(session, link_type, True))
 
 
-def _link_type(path: str | Path, session: Session, wanted: str | None) -> int:
+def _link_type(path: str | Path, session: Session, wanted: int | None) -> int:
     try:
-        return link_type_for(session.protocol, int(wanted) if wanted is not None else None)
+        return link_type_for(session.protocol, wanted)
     except ValueError as error:
         raise CaptureError(f"{path}: {error}") from None
 

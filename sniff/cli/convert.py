@@ -8,7 +8,7 @@ import argparse
 
 from dissectors.profiles import Devices
 from sniff.analysis.judging import Judging
-from sniff.bus.capture_writer import MICROSECONDS
+from sniff.bus.capture_writer import PacketOptions
 from sniff.bus.marked_rows import MarkedRows
 from sniff.bus.offline import survey
 from sniff.cli import USAGE, Failure, arguments, filtering, writing
@@ -55,17 +55,15 @@ def run(args: argparse.Namespace) -> int:
         frame_table.write(args, capture, session, arguments.noted_devices(args, session))
         say_incomplete(args.source, capture)
         return 0
-    options = {"link-type": str(args.link_type)} if args.link_type is not None else {}
-    if args.microseconds:
-        if not args.output.lower().endswith((".pcap", ".cap")):
-            raise Failure(f"{args.output}: --microseconds is for .pcap", USAGE)
-        options[MICROSECONDS] = "yes"
+    if args.microseconds and not args.output.lower().endswith((".pcap", ".cap")):
+        raise Failure(f"{args.output}: --microseconds is for .pcap", USAGE)
     devices = arguments.noted_devices(args, session)
     session = with_devices(session, devices)
     noted = args.output.lower().endswith(".pcapng") and not args.filter  # of a part the rows have other numbers
-    notes, marks = _evidence(capture, session, devices, args.reference) if noted else (None, None)
+    notes, marks = _evidence(capture, session, devices, args.reference) if noted else ({}, {})
+    packets = PacketOptions(args.link_type, args.microseconds, notes, marks)
     source = filtering.sifted(args, capture, session, devices)
-    writing.write(args, session, source, [args.source], options or None, devices=devices, notes=notes, marks=marks)
+    writing.write(args, session, source, [args.source], devices=devices, packets=packets)
     say_incomplete(args.source, capture)
     return 0
 

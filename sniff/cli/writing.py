@@ -24,6 +24,7 @@ from sniff.formats import parquet
 from sniff.formats.parquet import Kind, ParquetWriter
 
 if TYPE_CHECKING:
+    from sniff.bus.capture_writer import PacketOptions
     from sniff.cli.written_results import WrittenResults
     from sniff.engine.blocks import Block
 
@@ -39,27 +40,24 @@ def write(
     session: Session,
     source: ReadSource,
     sources: Sequence[str],
-    options: Mapping[str, str] | None = None,
     with_frames: bool = False,
     devices: Devices | None = None,
-    notes: Mapping[int, str] | None = None,
-    marks: Mapping[int, str] | None = None,
+    packets: PacketOptions | None = None,
 ) -> int:
     """Write a capture to `args.output`; say on standard error what it holds and what it lost. Gives the octets.
 
     An .mcap gets what a live recording has: /values, /bus, /nodes and /findings. `with_frames`: what the engine finds
     in the octets too, on /frames. `devices`: whose values are written, each of them; None: those of the session.
-    `notes`, `marks`: by row number, for the comments of packets where OUT has such. Ends with exit code 2 when OUT is
-    there.
+    `packets`: how, where OUT is a packet file. Ends with exit code 2 when OUT is there.
     """
     target = Path(args.output)
     refuse_to_overwrite(target, sources, args.force)
     counts = _Counts()
     watched = Watched(with_comments(source))
-    from sniff.bus.capture_writer import create  # with the formats that are written
+    from sniff.bus.capture_writer import PLAIN, create  # with the formats that are written
 
     try:
-        with create(target, session, options, notes, marks) as writer:
+        with create(target, session, packets or PLAIN) as writer:
             results = _results(writer, session, devices, with_frames)
             if isinstance(writer, BlockWriter) and not args.reference:
                 blocks = _blocks_written(writer, watched.blocks(), counts)

@@ -134,8 +134,8 @@ def bus(reads: int, seed: int = 1, strange: float = 0.0) -> list[Item]:
     return items
 
 
-def written(path: Path, items: Iterable[Item], session: Session = SESSION, **options: str) -> Path:
-    with capture_writer.create(path, session, options or None) as writer:
+def written(path: Path, items: Iterable[Item], session: Session = SESSION, link_type: int | None = None) -> Path:
+    with capture_writer.create(path, session, capture_writer.PacketOptions(link_type)) as writer:
         for item in items:
             writer.write(item)
     return path
@@ -220,11 +220,11 @@ def test_every_writable_format(tmp_path: Path, suffix: str, strange: float) -> N
         assert found == told(items)
 
 
-@pytest.mark.parametrize(("protocol", "link_type"), [("modbus-rtu", "250"), ("modbus-rtu", "252"), ("n2", "147")])
+@pytest.mark.parametrize(("protocol", "link_type"), [("modbus-rtu", 250), ("modbus-rtu", 252), ("n2", 147)])
 @pytest.mark.parametrize("suffix", [".pcap", ".pcapng"])
-def test_link_types(tmp_path: Path, suffix: str, protocol: str, link_type: str) -> None:
+def test_link_types(tmp_path: Path, suffix: str, protocol: str, link_type: int) -> None:
     source = formats.read(OWN / ("rtu-usual-faults.cap.txt" if protocol == "modbus-rtu" else "n2-usual-faults.cap.txt"))
-    path = written(tmp_path / f"bus{suffix}", source.items(), source.session, **{"link-type": link_type})
+    path = written(tmp_path / f"bus{suffix}", source.items(), source.session, link_type)
     same_file(path)
 
 
@@ -365,10 +365,10 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
         found[f"bus{suffix}"] = written(folder / f"bus{suffix}", items).read_bytes()
     found["plain.mcap"] = written(folder / "plain.mcap", bus(5000, 9)).read_bytes()
     source = formats.read(OWN / "rtu-usual-faults.cap.txt")
-    for link_type in ("250", "252"):
+    for link_type in (250, 252):
         for suffix in (".pcap", ".pcapng"):
             path = folder / f"{link_type}{suffix}"
-            found[path.name] = written(path, source.items(), source.session, **{"link-type": link_type}).read_bytes()
+            found[path.name] = written(path, source.items(), source.session, link_type).read_bytes()
     return found
 
 
@@ -403,16 +403,16 @@ def test_damaged_octets(tmp_path: Path, files: dict[str, bytes], name: str, data
 
 
 @pytest.mark.parametrize("suffix", [".mcap", ".pcap", ".pcapng"])
-@pytest.mark.parametrize("link_type", ["165", "250", "252"])
+@pytest.mark.parametrize("link_type", [165, 250, 252])
 def test_a_clean_capture_is_never_read_item_by_item(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, link_type: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, link_type: int
 ) -> None:
-    if link_type == "165":
-        items, session, options = bus(2000), SESSION, {}
+    if link_type == 165:
+        items, session, of_type = bus(2000), SESSION, None
     else:
         clean = formats.read(OWN / "rtu-clean.cap.txt")
-        items, session, options = list(clean.items()), clean.session, {"link-type": link_type}
-    path = written(tmp_path / f"bus{suffix}", items, session, **(options if suffix != ".mcap" else {}))
+        items, session, of_type = list(clean.items()), clean.session, link_type
+    path = written(tmp_path / f"bus{suffix}", items, session, of_type if suffix != ".mcap" else None)
     capture = formats.read(path)
     expected = told(capture.items())
 

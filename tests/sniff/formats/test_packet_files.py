@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from sniff.bus.capture_writer import create
+from sniff.bus.capture_writer import PacketOptions, create
 from sniff.bus.offline import settled
 from sniff.cli import main
 from sniff.engine.blocks import Block
@@ -47,10 +47,10 @@ TSHARK = shutil.which("tshark")
 needs_tshark = pytest.mark.skipif(TSHARK is None, reason="tshark is not installed")
 
 
-def converted(folder: Path, name: str, text: str = MODBUS, options: dict[str, str] | None = None) -> Path:
+def converted(folder: Path, name: str, text: str = MODBUS, link_type: int | None = None) -> Path:
     capture = parse(text)
     path = folder / name
-    with create(path, capture.session, options) as writer:
+    with create(path, capture.session, PacketOptions(link_type)) as writer:
         for item in capture.items():
             writer.write(item)
     return path
@@ -70,18 +70,18 @@ def tshark(path: Path, *names: str, options: tuple[str, ...] = ()) -> list[list[
 
 
 @pytest.mark.parametrize(
-    ("name", "options"),
+    ("name", "link_type"),
     [
         ("x.pcapng", None),
-        ("x.pcapng", {"link-type": "147"}),
-        ("x.pcapng", {"link-type": "250"}),
+        ("x.pcapng", 147),
+        ("x.pcapng", 250),
         ("x.pcap", None),
-        ("x.pcap", {"link-type": "147"}),
+        ("x.pcap", 147),
     ],
 )
-def test_frames_and_their_ends_come_back(tmp_path: Path, name: str, options: dict[str, str] | None) -> None:
+def test_frames_and_their_ends_come_back(tmp_path: Path, name: str, link_type: int | None) -> None:
     before = [(item.time, item.octets.hex()) for item in parse(MODBUS).items() if isinstance(item, Chunk)]
-    assert frames(converted(tmp_path, name, options=options)) == before
+    assert frames(converted(tmp_path, name, link_type=link_type)) == before
 
 
 def test_our_pcapng_comes_back_with_its_session(tmp_path: Path) -> None:
@@ -93,7 +93,7 @@ def test_our_pcapng_comes_back_with_its_session(tmp_path: Path) -> None:
 
 def test_a_link_type_that_cannot_hold_the_protocol_is_refused(tmp_path: Path) -> None:
     with pytest.raises(CaptureError, match="link type 165 cannot hold modbus-rtu; possible: 252, 147, 250"):
-        converted(tmp_path, "x.pcapng", options={"link-type": "165"})
+        converted(tmp_path, "x.pcapng", link_type=165)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -127,7 +127,7 @@ def test_wireshark_tells_request_from_response_by_the_synthetic_ports(tmp_path: 
 @needs_tshark
 def test_wireshark_reads_rtac_with_decode_as(tmp_path: Path) -> None:
     text = MODBUS.replace("01 03 04 00 D7 00 1A", "01 03 04 00 D7 00!P 1A")
-    path = converted(tmp_path, "x.pcapng", text, {"link-type": "250"})
+    path = converted(tmp_path, "x.pcapng", text, 250)
     rows = tshark(path, "rtacser.eventtype", "mbrtu.unit_id", "_ws.malformed", options=("-d", "rtacser.data,mbrtu"))
     assert [row[0] for row in rows][:3] == ["0x01", "0x08", "0x02"]  # request, parity error, response
     assert [row[1] for row in rows if row[1]] == ["1", "1", "5", "5", "1", "1", "1"]
