@@ -20,7 +20,8 @@ from sniff.analysis.line_rules import LINE_RULES
 from sniff.analysis.profile_rules import PROFILE_RULES
 from sniff.analysis.site_rules import SITE_RULES
 from sniff.engine.engine import Output, Row
-from sniff.engine.session import LineEvent, LineEventKind, Session, settings_change
+from sniff.engine.event_texts import settings_change
+from sniff.engine.session import LineEvent, LineEventKind, Session
 
 if TYPE_CHECKING:
     from dissectors.columns import Masks, TransactionColumns

@@ -8,7 +8,8 @@ from __future__ import annotations
 from dissectors.line import NS_PER_S
 from sniff.box.status import State
 from sniff.capture.ipc import Ended, Status
-from sniff.engine.session import LineEvent, LineEventKind, gone_why
+from sniff.engine.event_texts import gone_why
+from sniff.engine.session import LineEvent, LineEventKind
 
 QUIET = 60 * NS_PER_S
 """A bus from which nothing came for so long (ns) is silent."""

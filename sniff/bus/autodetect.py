@@ -1,7 +1,7 @@
 """The search for line settings and protocol on a running capture: the port is opened once and never closed for it.
 
 The capture process reads, records and changes the settings when it is told to; what is heard is judged here. Each
-change, and the end, is a SETTINGS event in the recording (`sniff.engine.session.SettingsChange`).
+change, and the end, is a SETTINGS event in the recording (`sniff.engine.event_texts.SettingsChange`).
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from dissectors.line import NS_PER_S, LineSettings
 from sniff.analysis.autodetect import Detecting, Outcome
 from sniff.capture.ipc import Ended, Message, ReceivedMessage, Tick
 from sniff.capture.link import CaptureLink
-from sniff.engine.session import LineEvent, LineEventKind, refused_line, settings_change
+from sniff.engine.event_texts import refused_line, settings_change
+from sniff.engine.session import LineEvent, LineEventKind
 
 ANSWER_PATIENCE = 3 * NS_PER_S
 """How long a change of settings may take to be confirmed, ns, before it is asked for again."""

@@ -32,7 +32,8 @@ from sniff.capture.ipc import (
 )
 from sniff.capture.spawn import Spawned, spawn
 from sniff.engine.capture import CaptureError
-from sniff.engine.session import Session, SettingsChange
+from sniff.engine.event_texts import SettingsChange
+from sniff.engine.session import Session
 from sniff.recording.derived_message import DerivedMessage
 from sniff.sources import PortError
 from sniff.sources.clock import Clock

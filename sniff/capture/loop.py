@@ -31,7 +31,8 @@ from sniff.capture.ipc_sender import IpcSender
 from sniff.capture.run_watch import RunWatch
 from sniff.capture.trigger_ring import TriggerRing
 from sniff.capture.waiting import Waiting
-from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange, refusal
+from sniff.engine.event_texts import SettingsChange, refusal
+from sniff.engine.session import Item, LineEvent, LineEventKind, Session
 from sniff.recording.writer import Recorder
 from sniff.sources import PortError, Source
 from sniff.sources.clock import STEP, Clock

@@ -21,8 +21,9 @@ from sniff.bus.second_protocol import ForeignFrames
 from sniff.cli import arguments, filtering, json_output
 from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
+from sniff.engine.event_texts import settings_change
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.session import LINE_NOTE, Adapter, LineEvent, Session, settings_change
+from sniff.engine.session import LINE_NOTE, Adapter, LineEvent, Session
 
 if TYPE_CHECKING:
     from sniff.engine.table import Table

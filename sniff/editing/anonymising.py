@@ -19,17 +19,9 @@ from dissectors.profiles.packaged import names
 from dissectors.pseudonyms import Renamer, without_text
 from sniff.devices import EVERY, address, noted
 from sniff.engine.engine import Output
+from sniff.engine.event_texts import settings_change
 from sniff.engine.follow_settings import engine_for
-from sniff.engine.session import (
-    ASSUMED,
-    DEVICES_NOTE,
-    LINE_NOTE,
-    Item,
-    LineEvent,
-    LineEventKind,
-    Session,
-    settings_change,
-)
+from sniff.engine.session import ASSUMED, DEVICES_NOTE, LINE_NOTE, Item, LineEvent, LineEventKind, Session
 
 ERROR_NAMES = frozenset(("parity", "framing", "break", "overrun", "buffer overrun"))
 """What drivers and gateways call errors that they count."""

@@ -14,9 +14,10 @@ from sniff.analysis.judging import Judging
 from sniff.bus.offline import survey
 from sniff.devices import noted_devices
 from sniff.engine.engine import Output, Row
+from sniff.engine.event_texts import SettingsChange, settings_change
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.read_source import ReadSource
-from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
+from sniff.engine.session import Item, LineEvent, LineEventKind, Session
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block

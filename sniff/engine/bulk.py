@@ -19,13 +19,14 @@ from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction
 from sniff.engine.blocks import Block
 from sniff.engine.engine import Engine, Output, Row, without_times
+from sniff.engine.event_texts import settings_change
 from sniff.engine.follow_settings import SessionEngine
 from sniff.engine.framing import BulkFraming, Clean, Stretch
 from sniff.engine.gathering import gathered
 from sniff.engine.late_columns import LateColumns
 from sniff.engine.placing import Placing, RowsAhead
 from sniff.engine.read_source import ReadSource, stored_tables
-from sniff.engine.session import LineEvent, Session, settings_change
+from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table, joined
 from sniff.engine.whole_capture import whole
 

@@ -24,7 +24,8 @@ from dissectors.frame import Chunk, Noise, Place, Reason
 from dissectors.line import LineSettings, Timing
 from dissectors.manifest import Dissector
 from sniff.engine.engine import NOTHING, Engine, Output, Row, together
-from sniff.engine.session import Item, Session, SettingsChange, settings_change
+from sniff.engine.event_texts import SettingsChange, settings_change
+from sniff.engine.session import Item, Session
 
 MOST_HELD_OCTETS = 4 << 20
 MOST_HELD_READS = 200_000

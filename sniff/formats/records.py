@@ -17,17 +17,8 @@ from dissectors import registry
 from dissectors.findings import counted
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from sniff.engine.session import (
-    ASSUMED,
-    LINE_NOTE,
-    PROTOCOL_NOTE,
-    Adapter,
-    Item,
-    LineEvent,
-    LineEventKind,
-    Session,
-    SettingsChange,
-)
+from sniff.engine.event_texts import SettingsChange
+from sniff.engine.session import ASSUMED, LINE_NOTE, PROTOCOL_NOTE, Adapter, Item, LineEvent, LineEventKind, Session
 from sniff.formats.linktypes import LINK_TYPES
 from sniff.formats.linktypes import protocol_of as protocol_of_link
 

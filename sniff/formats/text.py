@@ -40,6 +40,7 @@ from typing import TYPE_CHECKING, BinaryIO
 from dissectors.frame import Chunk
 from dissectors.line import MS, LineSettings
 from sniff.engine.capture import CaptureError
+from sniff.engine.event_texts import settings_change
 from sniff.engine.session import (
     ASSUMED,
     DEVICES_NOTE,
@@ -50,7 +51,6 @@ from sniff.engine.session import (
     LineEvent,
     LineEventKind,
     Session,
-    settings_change,
 )
 from sniff.formats.files import NewFile, explain, open_capture
 from sniff.formats.text_line import DEVICE, EPOCH, HEADER, MAGIC, MARKS, VERSION, Line, is_device, plain_chunk

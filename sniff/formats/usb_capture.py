@@ -21,7 +21,8 @@ from dissectors import registry
 from dissectors.frame import Chunk, Mark
 from dissectors.line import MS, LineSettings
 from sniff.engine.capture import Capture, CaptureError
-from sniff.engine.session import LINE_NOTE, Adapter, Item, LineEvent, LineEventKind, SettingsChange
+from sniff.engine.event_texts import SettingsChange
+from sniff.engine.session import LINE_NOTE, Adapter, Item, LineEvent, LineEventKind
 from sniff.formats.bus_evidence import Evidence, evidence_of
 from sniff.formats.packet_bus import PacketBus, Reader, RecordFile
 from sniff.formats.records import FOREIGN_LATENCY, NOT_KEPT, PacketRecord

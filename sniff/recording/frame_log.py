@@ -9,7 +9,8 @@ import numpy as np
 from dissectors.columns import Times
 from sniff.engine.bulk import FAR
 from sniff.engine.engine import Output
-from sniff.engine.session import LineEvent, Session, settings_change
+from sniff.engine.event_texts import settings_change
+from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table, joined
 from sniff.recording.frames import StoredTable, encode, octets_of
 from sniff.recording.stored_tables import StoredRecord, is_kept, record_of

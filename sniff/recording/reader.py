@@ -18,7 +18,8 @@ import numpy as np
 
 from dissectors.columns import Reads
 from sniff.engine.blocks import BLOCK_OCTETS, Block, blocks_of, plain_reads
-from sniff.engine.session import Completeness, Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
+from sniff.engine.event_texts import SettingsChange, settings_change
+from sniff.engine.session import Completeness, Item, LineEvent, LineEventKind, Session
 from sniff.formats.files import explain, open_capture
 from sniff.formats.several_buses import SeveralBuses
 from sniff.recording import scan

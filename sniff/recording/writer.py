@@ -18,14 +18,8 @@ from typing import TYPE_CHECKING
 
 from dissectors.frame import Chunk
 from dissectors.line import NS_PER_S
-from sniff.engine.session import (
-    UNKNOWABLE,
-    LineEvent,
-    LineEventKind,
-    Session,
-    SettingsChange,
-    settings_change,
-)
+from sniff.engine.event_texts import SettingsChange, settings_change
+from sniff.engine.session import UNKNOWABLE, LineEvent, LineEventKind, Session
 from sniff.recording import writer_thread
 from sniff.recording.batcher import Batcher
 from sniff.recording.derived_message import DerivedMessage

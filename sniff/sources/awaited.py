@@ -10,7 +10,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from dissectors.line import NS_PER_S, LineSettings
-from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, gone
+from sniff.engine.event_texts import gone
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.sources import PortError, Source
 from sniff.sources.clock import Clock
 from sniff.sources.drivers import UNKNOWN

@@ -12,7 +12,8 @@ from typing import Protocol
 from urllib.parse import urlsplit
 
 from dissectors.line import MS, NS_PER_S, LineSettings
-from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, gone
+from sniff.engine.event_texts import gone
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.sources import PortError
 from sniff.sources.clock import Clock
 from sniff.sources.reconnecting import Reconnecting

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 from dissectors.frame import Chunk
 from dissectors.line import MS, NS_PER_S, LineSettings
-from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, gone
+from sniff.engine.event_texts import gone
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.sources import PortError
 from sniff.sources.clock import Clock
 from sniff.sources.identity import PortIdentity

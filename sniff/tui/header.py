@@ -14,7 +14,8 @@ from sniff.analysis.health import Health
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.feed import FeedStatus
 from sniff.bus.rows import Store
-from sniff.engine.session import LineEventKind, gone_why
+from sniff.engine.event_texts import gone_why
+from sniff.engine.session import LineEventKind
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import fit
 from sniff.tui.times import size

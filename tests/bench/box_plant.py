@@ -29,7 +29,8 @@ from sniff.capture.process import session_of
 from sniff.cli import UNREADABLE, Failure
 from sniff.cli.targets import Target
 from sniff.engine.capture import CaptureError
-from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session, gone
+from sniff.engine.event_texts import gone
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session
 from sniff.recording.derived_message import DerivedMessage
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import SharedFile

@@ -27,7 +27,8 @@ from dissectors.line import LineSettings  # noqa: E402
 from sniff.capture import link  # noqa: E402
 from sniff.capture.spawn import Spawned  # noqa: E402
 from sniff.capture.waiting import Call, Waiting  # noqa: E402
-from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, SettingsChange  # noqa: E402
+from sniff.engine.event_texts import SettingsChange  # noqa: E402
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind  # noqa: E402
 from sniff.simulation.collision import low_times, receive  # noqa: E402
 from sniff.simulation.scenarios import bursts, scenario  # noqa: E402
 from sniff.simulation.wire import Burst  # noqa: E402

@@ -23,7 +23,7 @@ from sniff.cli import main
 from sniff.cli.listening import start
 from sniff.cli.searching import Unknowns
 from sniff.engine.engine import Output
-from sniff.engine.session import settings_change
+from sniff.engine.event_texts import settings_change
 from sniff.formats import read
 from tests.e2e.running import rest_of
 

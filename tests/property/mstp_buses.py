@@ -15,7 +15,7 @@ from dissectors.checksums import crc8_mstp
 from dissectors.columns import Reads
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings, Timing
-from sniff.engine.session import SettingsChange
+from sniff.engine.event_texts import SettingsChange
 from sniff.formats import read
 
 MS = 1_000_000

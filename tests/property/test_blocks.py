@@ -21,7 +21,8 @@ from sniff import formats
 from sniff.bus import capture_writer
 from sniff.engine.blocks import BLOCK_OCTETS, BLOCK_READS, Block, blocks_of, plain_reads
 from sniff.engine.capture import Capture, CaptureError
-from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange
+from sniff.engine.event_texts import SettingsChange
+from sniff.engine.session import Item, LineEvent, LineEventKind, Session
 from sniff.formats import pcap_walk, pcapng, pcapng_walk
 from sniff.formats.linktypes import RTAC, rtac_record
 from sniff.formats.table import suffixes

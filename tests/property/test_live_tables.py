@@ -17,7 +17,8 @@ from sniff.engine.blocks import Block, Gathering
 from sniff.engine.bulk import BulkEngine
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output, Row
-from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange
+from sniff.engine.event_texts import SettingsChange
+from sniff.engine.session import Item, LineEvent, LineEventKind, Session
 from sniff.engine.table import Table
 from sniff.formats import read
 from tests.bench import bulk_rtu

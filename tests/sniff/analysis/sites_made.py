@@ -14,7 +14,8 @@ from pathlib import Path
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from dissectors.modbus.envelope import seal_rtu
-from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session, gone
+from sniff.engine.event_texts import gone
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session
 from sniff.recording.writer import SharedFile
 
 S, MS = 1_000_000_000, 1_000_000

@@ -6,7 +6,8 @@ import pytest
 
 from dissectors.line import NS_PER_S
 from sniff.analysis.port_presence import PortPresence
-from sniff.engine.session import LineEvent, LineEventKind, gone
+from sniff.engine.event_texts import gone
+from sniff.engine.session import LineEvent, LineEventKind
 
 GONE, BACK = LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED
 STARTED = 1_773_000_000 * NS_PER_S

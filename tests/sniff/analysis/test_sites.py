@@ -24,8 +24,9 @@ from sniff.bus.site import site_bus
 from sniff.cli import main
 from sniff.engine.blocks import Block, blocks_of
 from sniff.engine.engine import Output
+from sniff.engine.event_texts import gone
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.session import Item, LineEvent, LineEventKind, gone
+from sniff.engine.session import Item, LineEvent, LineEventKind
 from tests.seeds import seeds
 from tests.sniff.analysis.sites_made import BASE, SITES, Site, sessions, write
 

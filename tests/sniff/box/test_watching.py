@@ -6,7 +6,8 @@ from sniff.box.progress import SILENCE, STUCK, Progress
 from sniff.box.status import State
 from sniff.box.watch import QUIET, BusWatch
 from sniff.capture.ipc import Ended, Status
-from sniff.engine.session import LineEvent, LineEventKind, gone
+from sniff.engine.event_texts import gone
+from sniff.engine.session import LineEvent, LineEventKind
 
 S = 1_000_000_000
 

@@ -10,7 +10,8 @@ from dissectors.line import LineSettings
 from sniff.analysis.autodetect import Detecting
 from sniff.bus.autodetect import Search
 from sniff.capture.ipc import ReceivedMessage, Tick
-from sniff.engine.session import LineEvent, LineEventKind, Session, refusal, refused_line
+from sniff.engine.event_texts import refusal, refused_line
+from sniff.engine.session import LineEvent, LineEventKind, Session
 
 FIRST, OTHER = LineSettings.parse("9600,8N1"), LineSettings.parse("4800,7E1")
 

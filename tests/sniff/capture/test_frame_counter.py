@@ -5,7 +5,8 @@ import time
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.capture.frame_counter import FrameCounter
-from sniff.engine.session import UNKNOWABLE, LineEvent, LineEventKind, Session, SettingsChange
+from sniff.engine.event_texts import SettingsChange
+from sniff.engine.session import UNKNOWABLE, LineEvent, LineEventKind, Session
 
 MS = 1_000_000
 LINE = LineSettings.parse("19200,8E1")

@@ -12,7 +12,8 @@ from dissectors.line import LineSettings
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.ipc import ReceivedMessage
 from sniff.capture.link import CaptureLink
-from sniff.engine.session import LineEvent, LineEventKind, SettingsChange
+from sniff.engine.event_texts import SettingsChange
+from sniff.engine.session import LineEvent, LineEventKind
 from sniff.formats import read
 from tests.e2e.recording_bus import octets_of, wait_until
 

@@ -17,18 +17,9 @@ from sniff.bus.offline import outputs
 from sniff.editing.cutting import Stretch, cut
 from sniff.engine import follow_settings
 from sniff.engine.engine import Output, Row
+from sniff.engine.event_texts import SettingsChange
 from sniff.engine.follow_settings import SessionEngine
-from sniff.engine.session import (
-    ASSUMED,
-    UNKNOWABLE,
-    Adapter,
-    Item,
-    LineEvent,
-    LineEventKind,
-    Session,
-    SettingsChange,
-    with_settings,
-)
+from sniff.engine.session import ASSUMED, UNKNOWABLE, Adapter, Item, LineEvent, LineEventKind, Session, with_settings
 
 MS = 1_000_000
 FIRST, RIGHT = LineSettings.parse("9600,8N1"), LineSettings.parse("19200,8E1")

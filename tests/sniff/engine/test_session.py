@@ -9,7 +9,8 @@ import pytest
 
 from dissectors.line import LineSettings
 from sniff.analysis.line_findings import LineFindings
-from sniff.engine.session import Adapter, LineEvent, LineEventKind, Session, gone, gone_why
+from sniff.engine.event_texts import gone, gone_why
+from sniff.engine.session import Adapter, LineEvent, LineEventKind, Session
 
 SESSION = Session("/dev/ttyUSB0", LineSettings.parse("9600,8E1"), "modbus-rtu")
 

@@ -20,7 +20,8 @@ from sniff.bus.offline import settled
 from sniff.cli import main
 from sniff.engine.blocks import Block
 from sniff.engine.capture import CaptureError
-from sniff.engine.session import Adapter, LineEvent, LineEventKind, Session, SettingsChange, settings_change
+from sniff.engine.event_texts import SettingsChange, settings_change
+from sniff.engine.session import Adapter, LineEvent, LineEventKind, Session
 from sniff.formats import read
 from sniff.formats.linktypes import USER1
 from sniff.formats.pcapng import PcapngWriter

@@ -11,7 +11,8 @@ import pytest
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
 from sniff.engine.blocks import Block
-from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange
+from sniff.engine.event_texts import SettingsChange
+from sniff.engine.session import Item, LineEvent, LineEventKind, Session
 from sniff.recording import scan
 from sniff.recording.derived_message import DerivedMessage
 from sniff.recording.reader import McapCapture

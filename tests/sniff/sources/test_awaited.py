@@ -6,7 +6,8 @@ import pytest
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, gone
+from sniff.engine.event_texts import gone
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.sources import PortError
 from sniff.sources.awaited import RETRY_EVERY, AwaitedSource
 from sniff.sources.clock import Clock

@@ -15,9 +15,10 @@ from sniff.analysis.site_ear import SiteEar
 from sniff.bus.feed import FeedStatus, StoreFeed
 from sniff.bus.offline import outputs
 from sniff.bus.rows import Store
+from sniff.engine.event_texts import gone
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import observe
-from sniff.engine.session import LineEvent, LineEventKind, gone
+from sniff.engine.session import LineEvent, LineEventKind
 from sniff.tui.app import SnifferApp
 from sniff.tui.busbar import labels
 from sniff.tui.seats import BusLine, BusState, Seat

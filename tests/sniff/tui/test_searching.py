@@ -10,8 +10,9 @@ from sniff.bus.feed import FeedStatus
 from sniff.bus.model import BusModel
 from sniff.bus.rows import Store
 from sniff.engine.engine import Output
+from sniff.engine.event_texts import SettingsChange
 from sniff.engine.follow_settings import SessionEngine
-from sniff.engine.session import UNKNOWABLE, LineEvent, LineEventKind, Session, SettingsChange
+from sniff.engine.session import UNKNOWABLE, LineEvent, LineEventKind, Session
 
 MS = 1_000_000
 FIRST, RIGHT = LineSettings.parse("9600,8N1"), LineSettings.parse("38400,8N1")
