@@ -47,6 +47,21 @@ class Adapter:
         return f"holds octets back up to {milliseconds(self.latency)} ({self.latency_from})"
 
     @property
+    def is_unknown(self) -> bool:
+        """Whether nobody says what it may hold back: `latency` is an assumption."""
+        return self.latency_from in UNNAMED
+
+    @property
+    def is_inferred(self) -> bool:
+        """Whether its reads say it."""
+        return self.latency_from.startswith(INFERRED)
+
+    @property
+    def has_times(self) -> bool:
+        """Whether anything says when octets came."""
+        return self.latency_from not in (NO_TIMES, NO_TIMES_OF_PACKETS)
+
+    @property
     def lineless(self) -> bool:
         """Whether octets come through no line of this machine, so that all line settings hear the same."""
         return self.driver in LINELESS or self.name in LINELESS
@@ -128,12 +143,12 @@ class Session:
         several reads that hold more octets than can have come: a single one is a computer that was busy.
         """
         said = self.said or self.adapter
-        if self.reads is not None and said.latency_from in UNNAMED and self._is_coarse:
+        if self.reads is not None and said.is_unknown and self._is_coarse:
             return replace(self, adapter=replace(said, latency=self.reads.unit, latency_from=COARSE), said=said)
         if self.reads is None or not self.has_times or "line" in self.unknown or self.line_is_assumed:
             return self
         told = held_back(self.reads, self.line, said.latency)
-        is_named = said.latency or said.latency_from not in UNNAMED
+        is_named = said.latency or not said.is_unknown
         if is_named and (told.impossible < 3 or 500 * told.impossible < len(self.reads.octets)):
             return replace(self, adapter=said, said=None)
         if told.latency <= said.latency:
@@ -165,14 +180,13 @@ class Session:
     @property
     def timing(self) -> Timing:
         """The line with what the adapter allows."""
-        latency, said_by = self.adapter.latency, self.adapter.latency_from
-        is_told = said_by not in UNNAMED and not said_by.startswith(INFERRED)
-        return Timing(self.line, latency, is_told, not self.line_is_assumed, self.has_times)
+        is_told = not self.adapter.is_unknown and not self.adapter.is_inferred
+        return Timing(self.line, self.adapter.latency, is_told, not self.line_is_assumed, self.has_times)
 
     @property
     def has_times(self) -> bool:
         """Whether the capture says when anything came; where not, its octets are laid one behind the other."""
-        return self.adapter.latency_from not in (NO_TIMES, NO_TIMES_OF_PACKETS)
+        return self.adapter.has_times
 
     def found(self, line: LineSettings | None, protocol: str | None) -> Session:
         """The session once its search has ended with these settings."""
