@@ -15,15 +15,21 @@ import socketserver
 import threading
 from collections.abc import Mapping, Sequence
 from http.client import HTTPConnection, HTTPException
-from http.server import BaseHTTPRequestHandler
 from pathlib import Path
-from typing import Any
 
+from sniff.bounded_http import FewReaders, QuietHandler
 from sniff.box.status import BoxStatus
 
 HOST = "127.0.0.1"
 READERS = 8
+_QUEUE = 4 * READERS
+
 PATIENCE = 5.0
+"""Seconds for a reader to go on, and for a box to say how it is."""
+
+ALL_PATIENCE = 5.0
+"""Seconds for a reader to be done."""
+
 MOST = 4 << 20
 """Octets of an answer that are read."""
 
@@ -43,6 +49,7 @@ class StatusPage:
         self.json, self.words = "{}", ""
         self.path = path
         self._servers: list[socketserver.BaseServer] = []
+        self._places = threading.BoundedSemaphore(READERS)
         self.port: int | None = None
         try:
             if path is not None:
@@ -57,7 +64,8 @@ class StatusPage:
             self.close()
             raise
 
-    def _serve(self, server: socketserver.BaseServer) -> None:
+    def _serve(self, server: _TcpServer | _UnixServer) -> None:
+        server.places, server.patience = self._places, ALL_PATIENCE
         self._servers.append(server)
         threading.Thread(target=server.serve_forever, name="status", daemon=True).start()
 
@@ -72,66 +80,29 @@ class StatusPage:
         self._servers = []
 
 
-class _Limited(socketserver.ThreadingMixIn):
-    """So many readers at once, none of whom is waited for."""
-
-    daemon_threads = True
-    block_on_close = False
-    request_queue_size = 4 * READERS
-
-    def process_request(self, request: Any, client_address: Any) -> None:
-        if not _PLACES.acquire(blocking=False):
-            self.shutdown_request(request)  # type: ignore[attr-defined]
-            return
-        super().process_request(request, client_address)
-
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        try:
-            super().process_request_thread(request, client_address)
-        finally:
-            _PLACES.release()
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """A reader that went away is nobody's business."""
-
-
-_PLACES = threading.BoundedSemaphore(READERS)
-
-
-class _TcpServer(_Limited, socketserver.TCPServer):
+class _TcpServer(FewReaders, socketserver.TCPServer):
     allow_reuse_address = True
+    request_queue_size = _QUEUE
 
 
 if HAS_UNIX:
 
-    class _UnixServer(_Limited, socketserver.UnixStreamServer):
-        pass
+    class _UnixServer(FewReaders, socketserver.UnixStreamServer):
+        request_queue_size = _QUEUE
 
 
-def _handler(page: StatusPage) -> type[BaseHTTPRequestHandler]:
-    class Handler(BaseHTTPRequestHandler):
+def _handler(page: StatusPage) -> type[QuietHandler]:
+    class Handler(QuietHandler):
         timeout = PATIENCE
 
-        def do_GET(self) -> None:
+        def get(self) -> None:
             pages = {"/status": ("application/json", page.json), "/": ("text/plain", page.words)}
             found = pages.get(self.path.partition("?")[0])
             if found is None:
                 self.send_error(404, "/status and / are here")
                 return
             kind, words = found
-            body = words.encode("utf-8", "replace")
-            self.send_response(200)
-            self.send_header("Content-Type", f"{kind}; charset=utf-8")
-            self.send_header("Content-Length", str(len(body)))
-            self.end_headers()
-            self.wfile.write(body)
-
-        def version_string(self) -> str:
-            """Nothing about this machine."""
-            return "sniff485"
-
-        def log_message(self, format: str, *args: object) -> None:
-            """Standard error is for people."""
+            self.answer(words, f"{kind}; charset=utf-8")
 
     return Handler
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 import hmac
 import socket
 import threading
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any
+from http.server import HTTPServer
 from urllib.parse import parse_qsl
 
+from sniff.bounded_http import FewReaders, QuietHandler
 from sniff.outlets.metrics import CONTENT_TYPE
 
 HOST = "127.0.0.1"
@@ -52,49 +52,21 @@ def is_token(token: str, authorization: str, query: str) -> bool:
     return hmac.compare_digest(shown.encode("utf-8", "replace"), token.encode())
 
 
-class _Server(ThreadingHTTPServer):
-    daemon_threads = True
-    block_on_close = False
+class _Server(FewReaders, HTTPServer):
     request_queue_size = READERS
 
     def __init__(self, owner: MetricsServer, host: str, port: int) -> None:
         self.owner = owner
-        self._places = threading.BoundedSemaphore(READERS)
+        self.places, self.patience = threading.BoundedSemaphore(READERS), ALL_PATIENCE
         self.address_family = socket.AF_INET6 if ":" in host else socket.AF_INET
         super().__init__((host, port), _Handler)
 
-    def process_request(self, request: Any, client_address: Any) -> None:
-        if not self._places.acquire(blocking=False):
-            self.shutdown_request(request)  # too many at once
-            return
-        super().process_request(request, client_address)
 
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        limit = threading.Timer(ALL_PATIENCE, _hang_up, (request,))
-        limit.daemon = True
-        limit.start()
-        try:
-            super().process_request_thread(request, client_address)
-        finally:
-            limit.cancel()
-            self._places.release()
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """A reader that went away is nobody's business."""
-
-
-def _hang_up(request: socket.socket) -> None:
-    try:
-        request.shutdown(socket.SHUT_RDWR)
-    except OSError:  # it is gone
-        return
-
-
-class _Handler(BaseHTTPRequestHandler):
+class _Handler(QuietHandler):
     timeout = PATIENCE
     server: _Server
 
-    def do_GET(self) -> None:
+    def get(self) -> None:
         path, _, query = self.path.partition("?")
         token = self.server.owner.token
         if token is not None and not is_token(token, self.headers.get("Authorization", ""), query):
@@ -102,20 +74,7 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_header("WWW-Authenticate", "Bearer")
             self.send_header("Content-Length", "0")
             self.end_headers()
-            return
-        if path != "/metrics":
+        elif path != "/metrics":
             self.send_error(404, "only /metrics is here")
-            return
-        body = self.server.owner.page.encode("utf-8", "replace")
-        self.send_response(200)
-        self.send_header("Content-Type", CONTENT_TYPE)
-        self.send_header("Content-Length", str(len(body)))
-        self.end_headers()
-        self.wfile.write(body)
-
-    def version_string(self) -> str:
-        """Nothing about this machine."""
-        return "sniff485"
-
-    def log_message(self, format: str, *args: object) -> None:
-        """Standard error is for people."""
+        else:
+            self.answer(self.server.owner.page, CONTENT_TYPE)

@@ -76,6 +76,16 @@ def said(path: Path, words: bytes) -> bytes:
         return answer
 
 
+def test_who_asks_too_slowly_is_hung_up_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sniff.box.page.ALL_PATIENCE", 0.05)
+    monkeypatch.setattr("sniff.box.page.PATIENCE", 60.0)
+    with served(tmp_path / "site.sock"), closing(socket.socket(socket.AF_UNIX)) as slow:
+        slow.settimeout(30)
+        slow.connect(str(tmp_path / "site.sock"))
+        slow.sendall(b"GET /status HTTP/1.1\r\n")
+        assert slow.recv(1) == b""
+
+
 def test_it_is_for_reading(tmp_path: Path) -> None:
     path = tmp_path / "site.sock"
     with served(path):
