@@ -52,6 +52,15 @@ def exact_duration(value: float, unit: int) -> str:
     return f"{'-' if value < 0 else ''}{whole}.{part:0{len(str(unit)) - 1}}".rstrip("0").rstrip(".")
 
 
+def span(seconds: float) -> str:
+    """How long something was watched, for people: "12.5 s", "15 min 0 s", "9 h 12 min"."""
+    if seconds < 120:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(int(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"
+
+
 def brief(value: float, most: int) -> str:
     """A number in `most` digits; of whole and of larger ones all before the point, never as a power of ten."""
     is_whole = float(value).is_integer() and abs(value) < _EXACT

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Rule, Severity, merged, times, under_causes
 from dissectors.line import NS_PER_S
+from dissectors.words import span
 from sniff.analysis.health import Health, health_of
 from sniff.analysis.json_text import dumps
 from sniff.analysis.judging import rules_over
@@ -140,7 +141,7 @@ def _write_head(one: Checked, width: int) -> None:
     session = one.session
     heard = f"{one.frames} frames"
     if one.session.has_times:
-        heard = f"{_span(one.seconds)}, {heard}"
+        heard = f"{span(one.seconds)}, {heard}"
     if one.buses:
         print(f"{sanitized(one.source)}: {sanitized(', '.join(one.buses))} together, {heard}")
         return
@@ -256,14 +257,6 @@ def _count_words(findings: Sequence[Finding]) -> str:
     under = sum(is_under for _, is_under in under_causes(findings))
     hanging = f" ({under} of them under {'its cause' if under == 1 else 'their causes'})" if under else ""
     return ", ".join(parts) + hanging + "; `sniff485 rule CODE` explains one"
-
-
-def _span(seconds: float) -> str:
-    if seconds < 120:
-        return f"{seconds:.1f} s"
-    minutes, rest = divmod(int(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"
 
 
 # ---- JSON Lines

@@ -9,7 +9,7 @@ from typing import Any
 
 from dissectors.line import MS
 from dissectors.tracker import Verdict
-from dissectors.words import bare_milliseconds, percent
+from dissectors.words import bare_milliseconds, percent, span
 from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.wording import station_word
 from sniff.reporting.numbers import CaptureNumbers
@@ -46,7 +46,7 @@ def page(reports: Sequence[CaptureNumbers]) -> str:
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=harmless
     )
-    environment.filters |= {"ms": _ms, "number": _number, "percent": percent, "seconds": _seconds, "span": _span,
+    environment.filters |= {"ms": _ms, "number": _number, "percent": percent, "seconds": _seconds, "span": span,
                             "verdict": _verdict, "damage": _damage}  # fmt: skip
     template = environment.from_string(resources.files(__package__).joinpath(TEMPLATE).read_text("utf-8"))
     sections = [
@@ -113,12 +113,3 @@ def _number(value: object) -> str:
 def _seconds(value: float | None) -> str:
     """Seconds since the start."""
     return "" if value is None else f"{value:.3f} s"
-
-
-def _span(seconds: float) -> str:
-    """A duration for people."""
-    if seconds < 120:
-        return f"{seconds:.1f} s"
-    minutes, rest = divmod(int(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"
