@@ -8,6 +8,7 @@ import argparse
 import contextlib
 import sys
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from dissectors import registry
 from dissectors.line import LineSettings
@@ -15,6 +16,11 @@ from sniff.cli import PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments
 from sniff.config import AUTO, Config, ConfigError, load
 from sniff.formats.linktypes import link_type_for
 from sniff.version import __version__
+
+if TYPE_CHECKING:
+    from sniff.bus.capture_writer import FrameWriter
+    from sniff.capture.ipc import Ended
+    from sniff.capture.link import CaptureLink
 
 PREFIX = "sniff485:"
 
@@ -108,7 +114,6 @@ def _capture(bus: _Bus, fifo: str) -> int:
 
     from sniff.bus.capture_writer import live_pcapng
     from sniff.capture.config import SourceSpec
-    from sniff.capture.ipc import Ended, ReceivedMessage, Tick
     from sniff.capture.link import CaptureLink
     from sniff.cli.interruption import until_interrupted
     from sniff.engine.capture import CaptureError
@@ -116,7 +121,6 @@ def _capture(bus: _Bus, fifo: str) -> int:
 
     if not Path(fifo).exists():
         raise Failure(f"extcap: {fifo}: no such pipe; Wireshark makes it", UNREADABLE)
-    ended: Ended | None = None
     with until_interrupted() as caught, contextlib.ExitStack() as stack:  # from before it begins
         try:
             link = stack.enter_context(CaptureLink.start([SourceSpec(bus.port, bus.line, bus.protocol, "rs485")]))
@@ -124,15 +128,23 @@ def _capture(bus: _Bus, fifo: str) -> int:
             raise Failure(str(error), PORT_TROUBLE) from None
         try:
             writer = live_pcapng(fifo, link.session(0))
-            while ended is None and not caught:
-                for message in link.receive(0.2):
-                    if isinstance(message, ReceivedMessage):
-                        writer.write(message.item)
-                    elif isinstance(message, Tick):
-                        writer.advance(message.now)
-                    elif isinstance(message, Ended):
-                        ended = message
+            ended = _pass_on(link, writer, caught)
             writer.close()
         except (CaptureError, BrokenPipeError):
             return 0  # Wireshark stopped reading: that is how it ends a capture
     return 0 if ended is None or ended.clean else PORT_TROUBLE
+
+
+def _pass_on(link: CaptureLink, writer: FrameWriter, caught: list[int]) -> Ended | None:
+    """Frames as they come, until the capture ends; None where a signal came first."""
+    from sniff.capture.ipc import Ended, ReceivedMessage, Tick
+
+    while not caught:
+        for message in link.receive(0.2):
+            if isinstance(message, ReceivedMessage):
+                writer.write(message.item)
+            elif isinstance(message, Tick):
+                writer.advance(message.now)
+            elif isinstance(message, Ended):
+                return message
+    return None
