@@ -1,4 +1,5 @@
 """Processes of `sniff485` that begin without a start of Python: forks of one that has imported what commands use.
+So does pytest where the plugin is tried in a project of its own.
 
 To start an interpreter and import a command takes a quarter of a second of a core, which is more than most tests of
 whole processes take for what they try. `Popen` and `run` are those of `subprocess`, and what they begin is a process
@@ -33,7 +34,9 @@ from pathlib import Path
 from typing import Any, TextIO
 
 ROOT = Path(__file__).parents[2]
-PROGRAM = [sys.executable, "-m", "sniff"]
+PYTHON = [sys.executable, "-m"]
+MODULES = ("sniff", "pytest")
+"""What is begun so."""
 READ_AT_START = ("PYTHON", "LC_", "LANG", "TZ", "LD_", "MALLOC")
 """How names of variables begin that an interpreter and its libraries read once."""
 
@@ -41,6 +44,7 @@ _HEAD = struct.Struct("!I")
 _USED = (
     *(f"sniff.cli.{name}" for name in ("box", "check", "demo", "detect", "extcap", "live", "points", "record", "show")),
     *("dissectors.bacnet", "dissectors.modbus", "dissectors.n2", "dissectors.profibus", "numpy", "mcap.reader"),
+    "pytest",
 )
 
 
@@ -58,7 +62,7 @@ class Popen(subprocess.Popen[Any]):
             return
         ends = pipes[0], pipes[3], pipes[5]
         order = {
-            "words": list(map(os.fspath, args[len(PROGRAM) :])),
+            "words": list(map(os.fspath, args[len(PYTHON) :])),
             "folder": os.path.abspath(cwd or "."),
             "environment": dict(os.environ if env is None else env),
             "is_leader": bool(start_new_session),
@@ -114,7 +118,9 @@ def run(*given: Any, capture_output: bool = False, timeout: float | None = None,
 
 
 def _may_be_forked(args: Any, environment: Mapping[str, str] | None) -> bool:
-    if not isinstance(args, Sequence) or list(args[: len(PROGRAM)]) != PROGRAM or not hasattr(os, "fork"):
+    if not isinstance(args, Sequence) or list(args[:-1][: len(PYTHON)]) != PYTHON or args[len(PYTHON)] not in MODULES:
+        return False
+    if not hasattr(os, "fork"):
         return False
     return environment is None or _read_at_start(environment) == _read_at_start(os.environ)
 
@@ -211,7 +217,7 @@ def _take_place(order: dict[str, Any], streams: list[int]) -> None:
     sys.stdin, sys.stdout, sys.stderr = (_made_anew(*one) for one in enumerate((sys.stdin, sys.stdout, sys.stderr)))
     sys.__stdin__, sys.__stdout__, sys.__stderr__ = sys.stdin, sys.stdout, sys.stderr
     sys.path[0] = order["folder"]
-    sys.argv = [PROGRAM[0], *order["words"]]
+    sys.argv = order["words"]
 
 
 def _made_anew(number: int, before: TextIO) -> TextIO:
@@ -229,7 +235,7 @@ def main(descriptor: int) -> None:
     with socket.socket(fileno=descriptor) as connection:
         order = _serve(connection)
     if order is not None:
-        runpy.run_module("sniff", run_name="__main__", alter_sys=True)
+        runpy.run_module(order["words"][0], run_name="__main__", alter_sys=True)
 
 
 if __name__ == "__main__":
