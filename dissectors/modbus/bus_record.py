@@ -35,7 +35,6 @@ _UNHEARD_LEAST = 3
 _CLOSE_KEPT = 4096
 _HASTY_KEPT = 256
 _CROSSED_KEPT = 256
-_WORDS_KEPT = 16
 _ELSEWHERE = 10  # of so many answers of its own one by another: what is rarer answered a request that was lost
 _LATE_KEPT = 4096
 
@@ -89,7 +88,6 @@ class BusRecord:
     `again`: requests that were answered when they came a second time.
     `crossed`: answers to the request before the newest, which came sooner than a turn takes; by what may follow what.
     `asked_twice`: second answers to requests that were heard twice, one directly behind the other.
-    `malformed`: requests that cannot be carried out, with the exceptions they got, and how many got nothing.
     `to_nobody`: reads of address 0, and who answered. `cut_echoes`: requests given back in part.
     `octets`, `frames`: of each sender ("master", "station 3").
     `late_frames`: answers that came too late. `broadcast_answers`: who answered broadcasts. `pairs`: (unit asked, unit
@@ -130,10 +128,6 @@ class BusRecord:
     odd_ends: dict[tuple[OddEnd, str], Tally] = field(default_factory=dict)
     pairs: dict[tuple[int, int], Tally] = field(default_factory=dict)
     repeated_elsewhere: Counter[int] = field(default_factory=Counter)
-    malformed: Tally = field(default_factory=Tally)
-    malformed_words: Counter[str] = field(default_factory=Counter)
-    malformed_codes: Counter[int] = field(default_factory=Counter)
-    malformed_unanswered: int = 0
     to_nobody: Tally = field(default_factory=Tally)
     for_nobody: Counter[int] = field(default_factory=Counter)
     cut_echoes: Tally = field(default_factory=Tally)
@@ -222,12 +216,6 @@ class BusRecord:
         if len(silent) >= least and len({key for unit in silent for key in self.stations[unit].requests}) <= _SEARCHES:
             return sorted(silent)
         return once if len(once) >= _SCAN_LEAST else []
-
-    def cannot_be(self, why: str, time: int, *frames: int | None) -> None:
-        """Note a request that nobody can carry out, with its frames."""
-        self.malformed.add(time, *frames)
-        if why in self.malformed_words or len(self.malformed_words) < _WORDS_KEPT:
-            self.malformed_words[why] += 1
 
     def too_close(self, sender: str, time: int, before: int, no: int) -> None:
         """Note a frame that began too soon after the one before."""

@@ -185,6 +185,8 @@ class ModbusFindings(RequestObserver):
     def _keep_damaged(self, frame: Frame) -> None:
         """A damaged frame that is a request, or may be one."""
         if frame.protocol == RTU_NAME:
+            if frame.octets[0] in self.seen.stations:
+                self.seen.stations[frame.octets[0]].damaged_requests += 1
             self.seen.text_damage.add(frame.octets, request_length(frame.octets))
 
     def _see_end(self, heard: Heard, unit: int, no: int, frame: Frame) -> None:
@@ -226,6 +228,8 @@ class ModbusFindings(RequestObserver):
             self.seen.damaged_requests.add(transaction.start, transaction.response)
             return
         self.seen.unasked.add(transaction.start, transaction.response)
+        if transaction.station in self.seen.stations:
+            self.seen.stations[transaction.station].unasked += 1
         self.seen.unasked_behind_noise += transaction.response == self.rubbish + 1
 
     def _settle_late(self, station: StationRecord, transaction: Transaction) -> None:

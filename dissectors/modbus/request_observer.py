@@ -27,9 +27,9 @@ class RequestObserver(RowObserver):
         is_missing = transaction.verdict is Verdict.NO_RESPONSE
         why = self._why_it_cannot_be(station, transaction, asked, heard.code)
         if why is not None:
-            self.seen.cannot_be(why, transaction.start, transaction.request, transaction.response)
+            station.impossible.add(why, transaction.start, transaction.request, transaction.response)
             if is_missing:  # a station may pass over it
-                self.seen.malformed_unanswered += 1
+                station.impossible.unanswered += 1
                 return
         request = self._count_try(station, transaction, asked)
         if is_missing:
@@ -157,7 +157,7 @@ class RequestObserver(RowObserver):
     ) -> None:
         """A station that refused, rightly where the request cannot be carried out."""
         if is_right:
-            self.seen.malformed_codes[code] += 1
+            station.impossible.codes[code] += 1
         else:
             station.exception(asked.key, code).add(transaction.end, transaction.request, transaction.response)
 
@@ -178,6 +178,12 @@ class RequestObserver(RowObserver):
         if ways_round:
             if self._is_within_a_turn(transaction, asked):
                 self.seen.cross(ways_round, transaction.end, transaction.request, transaction.response)
+            return
+        if heard.code is None and (asked.fault or asked.beyond) is not None:
+            rows = transaction.request, transaction.response
+            station.impossible.in_kind.add(transaction.end, *rows)
+            if asked.fault is None and asked.beyond is not None:  # others are counted already
+                station.impossible.add(asked.beyond, transaction.start, *rows)
             return
         unfit = Unfit(station, transaction, heard.answer)
         if self.timing.latency < AT_ONCE or asked.header.role is Role.REQUEST:

@@ -15,6 +15,7 @@ from dissectors.modbus.finding_words import note_if, of_few, request_words, unit
 from dissectors.modbus.functions import BROADCAST, MAX_UNIT
 from dissectors.modbus.odd_ends import OddEnd
 from dissectors.modbus.rules import RULES
+from dissectors.modbus.rules_impossible import of_impossible
 from dissectors.modbus.rules_late import of_impatience, of_late_speakers, under_late_answers
 from dissectors.modbus.rules_of_answers import RELAYED
 from dissectors.modbus.rules_station import FLAWS, SPOILT, is_absent, of_missing, of_station, wrongly_checked
@@ -63,10 +64,12 @@ def judge(seen: BusRecord, timeout: int | None) -> tuple[Finding, ...]:
 def _of_bus(seen: BusRecord, is_blamed: bool, scanned: list[int], unheard: list[int]) -> Iterator[Finding]:
     requests = sum(station.asked for station in seen.stations.values()) + seen.damaged_requests.count
     damaged = seen.damaged_requests
-    if damaged.count:
-        words = f"{damaged.count} of {counted(requests, 'request')} damaged{seen.when(damaged, requests)}"
-        rare = seen.rare(damaged.count, requests, damaged)
-        yield damaged.found(RULES["MB009"], "master", words, note_if(rare or not is_blamed))
+    count = damaged.count - sum(one.damaged_requests for one in seen.stations.values() if one.has_own_protocol)
+    if count > 0:
+        words = f"{count} of {counted(requests, 'request')} damaged{seen.when(damaged, requests, count)}"
+        rare = seen.rare(count, requests, damaged)
+        finding = damaged.found(RULES["MB009"], "master", words, note_if(rare or not is_blamed))
+        yield replace(finding, count=count)
     if not damaged.count or seen.damaged_here.count > damaged.count:
         yield from _damaged_here(seen, requests)
     yield from _cut_by_master(seen)
@@ -112,11 +115,13 @@ def _of_bus(seen: BusRecord, is_blamed: bool, scanned: list[int], unheard: list[
             yield replace(elsewhere, means=to_any) if asked > MAX_UNIT else elsewhere
     by_chance = [tally for pair, tally in seen.pairs.items() if tally.count >= 2 and pair not in told]
     unasked = together((seen.unasked, *by_chance))
-    if unasked.count:
-        words = f"{unasked.count} of {counted(seen.answers, 'answer')} came unasked"
-        of_themselves = seen.unasked.count - seen.unasked_behind_noise
+    makers = sum(one.unasked for one in seen.stations.values() if one.has_own_protocol)
+    if unasked.count > makers:
+        words = f"{unasked.count - makers} of {counted(seen.answers, 'answer')} came unasked"
+        of_themselves = seen.unasked.count - seen.unasked_behind_noise - makers
         many = of_themselves >= 3 and 100 * of_themselves >= seen.answers
-        yield unasked.found(RULES["MB207"], "bus", words, Severity.WARNING if many else None)
+        found_unasked = unasked.found(RULES["MB207"], "bus", words, Severity.WARNING if many else None)
+        yield replace(found_unasked, count=unasked.count - makers)
     yield from _cycle(seen)
 
 
@@ -154,14 +159,7 @@ def _cut_by_master(seen: BusRecord) -> Iterator[Finding]:
 
 def _of_requests(seen: BusRecord) -> Iterator[Finding]:
     """What is wrong with what the master sends, and what its own adapter makes of it."""
-    malformed = seen.malformed
-    if malformed.count:
-        why, _ = seen.malformed_words.most_common(1)[0] if seen.malformed_words else ("", 0)
-        words = f"{counted(malformed.count, 'request')} that cannot be carried out: {why}"
-        refused = sum(seen.malformed_codes.values())
-        words += f"; refused {times(refused)}, rightly" if refused else ""
-        words += f"; not answered {times(seen.malformed_unanswered)}" if seen.malformed_unanswered else ""
-        yield malformed.found(RULES["MB016"], "master", words)
+    yield from of_impossible(seen)
     nobody = seen.to_nobody
     if nobody.count:
         words = f"{counted(nobody.count, 'read')} of address 0, which is no station's"

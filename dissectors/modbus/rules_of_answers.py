@@ -191,8 +191,9 @@ ANSWER_RULES = (
         "requests that contradict themselves",
         "Good frames to functions 15, 16 or 23 whose byte count is not what their quantity takes (Modbus Application "
         "Protocol V1.1b3, 6.11, 6.12, 6.17); or requests for nothing, for more than the standard allows, beyond the "
-        "last address, or of a coil's value that is neither on nor off, answered by exception 2 or 3 or by nothing. "
-        "What comes of them is not held against the station.",
+        "last address, or of a coil's value that is neither on nor off, answered by exception 2 or 3, by nothing or by "
+        "what does not fit. What comes of them is not held against the station. A note about a station that refuses "
+        "none of them, and 3 in 4 of whose answers are good frames that contradict themselves as well.",
         "the master builds the request wrongly, and a station can only refuse it; or both speak a maker's own protocol "
         "in frames of Modbus",
         "the address, data type and length of this request in the master's configuration or program",

@@ -57,7 +57,7 @@ def of_station(
     if station.text_damage.change is None:  # else see `of_text_changes`
         yield from _damage(seen, unit, name, station, is_common)
     yield from _exceptions(seen, name, unit, station)
-    if station.unfit.count:
+    if station.unfit.count and not station.has_own_protocol:
         why, _ = station.unfit_words.most_common(1)[0] if station.unfit_words else ("", 0)
         words = f"{station.unfit.count} of {counted(station.answered, 'answer')} not as asked for: {why}"
         yield station.unfit.found(RULES["MB010"], name, words, note_if(station.unfit.count == 1))
@@ -108,7 +108,7 @@ def of_missing(seen: BusRecord, unit: int, station: StationRecord, is_scanned: b
         words = f"no answer to its last {silent.count} requests; last heard {duration(since)} before the end"
         yield silent.found(RULES["MB003"], name, words)
     ignored = [(key, request) for key, request in sorted(station.requests.items(), key=str) if _is_ignored(request)]
-    if station.answered >= 3 and silent.count < AWAY_LEAST:
+    if station.answered >= 3 and silent.count < AWAY_LEAST and not station.has_own_protocol:
         for key, request in ignored:
             if 10 * request.echoed >= 9 * request.tries:
                 words = f"{counted(request.tries, 'request')} to {request_words(key)}, all given back whole"
@@ -121,7 +121,7 @@ def of_missing(seen: BusRecord, unit: int, station: StationRecord, is_scanned: b
     explained = sum(request.missing.count for _, request in ignored)
     if silent.count >= AWAY_LEAST and station.answered:
         explained += silent.count
-    left = missing.count - explained
+    left = 0 if station.has_own_protocol else missing.count - explained
     if left > 0:
         away = station.away
         between = _ANSWERED_BETWEEN * station.times_away if station.times_away > 1 else 1

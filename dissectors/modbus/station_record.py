@@ -10,6 +10,7 @@ from itertools import pairwise
 from dissectors.findings import Tally, together
 from dissectors.frame import Flaw
 from dissectors.modbus.garbage import Garbage
+from dissectors.modbus.impossible import Impossible
 from dissectors.modbus.pairing import is_answer
 from dissectors.modbus.poll_order import Asked, Neighbours, PollOrder
 from dissectors.modbus.response_groups import AnsweredRequest, SameRequest
@@ -188,6 +189,9 @@ class StationRecord:
     undecided: Tally = field(default_factory=Tally)  # a frame that is the answer or the request again
     echoed: int = 0  # requests that were given back at once
     same_twice: int = 0  # second answers that say the same as the first
+    impossible: Impossible = field(default_factory=Impossible)  # requests to it
+    unasked: int = 0  # answers of it
+    damaged_requests: int = 0  # of RTU, that name it
     unfit: Tally = field(default_factory=Tally)
     unfit_words: Counter[str] = field(default_factory=Counter)
     slow: Tally = field(default_factory=Tally)
@@ -218,6 +222,11 @@ class StationRecord:
         flawed += miscounted.count if miscounted is not None else 0
         garbage = self.garbage.tally.count if self.garbage.is_system else 0
         return min(self.damaged.count, flawed + garbage)  # one answer may be explained twice
+
+    @property
+    def has_own_protocol(self) -> bool:
+        """Whether it speaks a maker's own protocol in frames of Modbus, so that what it says fits nothing."""
+        return self.impossible.is_own_protocol(self.answered)
 
     @property
     def miscounted(self) -> Habit | None:

@@ -262,14 +262,14 @@ class StretchEvidence:
 
     def _refused(self, at: int, key: Key) -> None:
         one, station = self._exchanged, self._took[self._exchanged.unit[at]].station
-        seen, first, code = self._judge.seen, one.rows.first, one.octets[one.answer_begin[at] + 2]
+        first, code = one.rows.first, one.octets[one.answer_begin[at] + 2]
         rows = first + one.request[at], first + one.last[at]
         beyond = beyond_limits(one.octets[one.begin[at] : one.end[at]]) if code in ILLEGAL else None
         if beyond is None:
             station.exception(key, code).add(one.ended[at], *rows)
         else:
-            seen.cannot_be(beyond, one.started[at], *rows)
-            seen.malformed_codes[code] += 1
+            station.impossible.add(beyond, one.started[at], *rows)
+            station.impossible.codes[code] += 1
 
     def _see_unusual(self, at: int, what: int, said: bytes) -> None:
         """A repeat, a request that nobody answers (what that means is known when the next one comes), one to all."""

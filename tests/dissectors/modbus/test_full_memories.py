@@ -7,6 +7,7 @@ import pytest
 from dissectors.line import Timing
 from dissectors.modbus import bus_record, rules_bus
 from dissectors.modbus.bus_record import BusRecord
+from dissectors.modbus.impossible import Impossible
 from tests.dissectors.modbus.judged import findings_of
 
 READ, VALUES = "010300000001", "0103020007"
@@ -57,12 +58,12 @@ def test_a_habit_stays_one_in_a_long_capture(frames):
 
 
 def test_the_commonest_words_are_the_commonest_of_all():
-    seen = BusRecord(Timing())
+    impossible = Impossible()
     for no in range(16):
-        seen.cannot_be(f"{no} is too many", no)
+        impossible.add(f"{no} is too many", no)
     for no in range(100):
-        seen.cannot_be("3 is too many", no)
-    assert seen.malformed_words.most_common(1) == [("3 is too many", 101)]
+        impossible.add("3 is too many", no)
+    assert impossible.words.most_common(1) == [("3 is too many", 101)]
 
 
 def test_a_pair_once_known_stays_known():
