@@ -8,11 +8,11 @@ from dataclasses import replace
 
 from dissectors.checksums import ends_with_crc16
 from dissectors.frame import Chunk
-from dissectors.line import MS, NS_PER_S, LineSettings
+from dissectors.line import MS, LineSettings
 from sniff.engine.session import Item, LineEvent, LineEventKind
 from sniff.formats.dump_rows import FILLED_UP, SAME_ROWS
-from sniff.formats.log_calendar import HOUR, Year, begins_summer, turn
-from sniff.formats.log_clock import DAY, Stamp
+from sniff.formats.log_calendar import Calendar, turn
+from sniff.formats.log_clock import Stamp
 from sniff.formats.log_lines import Kind, Line, head_of
 from sniff.formats.log_packets import carried
 from sniff.formats.log_placing import Placing
@@ -27,13 +27,7 @@ COARSE = 2 * MS
 LONGEST = 4096
 """Octets put together from several lines; what goes on after them is the next read, without a silence."""
 
-SET_BACK = 10 * NS_PER_S
-"""A line that came so long before the one above it was written by a clock that was set back meanwhile, as it is when
-summer ends; lines of several writers are nearer in order.
-"""
-
 _SENT = re.compile(r"\bsent\b", re.IGNORECASE)
-_BACKWARDS = 2_000_000_000
 _MOST_REPEATED = 1 << 16
 _LARGEST = 1 << 32
 """Octets that rows alike stand for; more is no file that somebody dumped."""
@@ -56,11 +50,7 @@ class Assembly:
         self._placing = Placing()
         self._first: Line | None = None  # of two that are the same
         self._shift = 0
-        self._shift_before: int | None = None  # before the clock was set back last
-        self._day = 0
-        self._date = 0  # of the line that told one last
-        self._clock = -1
-        self._year = Year()
+        self._calendar = Calendar(plan.times.steps)
         self._held = bytearray()
         self._stamp: Stamp | None = None
         self._samples: tuple[int, int] | None = None
@@ -298,63 +288,37 @@ class Assembly:
         length = len(octets) * (self._own_char if self._glued else self._char)  # no silence, however fast the line
         silence = 0 if self._glued or self._plan.width is not None else LINE_END
         self._glued = False
-        follows = self._last + length + (silence if self._any else 0)
-        time = follows
-        is_told = not self._plan.timed
+        if len(octets) == 1 and self._plan.octetwise and self._clocked:
+            silence = 0
+        time = self._last + length + (silence if self._any else 0)
+        is_told, by = not self._plan.timed, None
         has_time = (self._stamp is not None and not self._is_used_again) or self._samples is not None
         if self._samples is not None and self._plan.bit_samples:
             ended = (self._samples[1] + self._plan.bit_samples) / self._plan.bit_samples * self._bit
-            time, is_told = max(self._last, length, int(ended)) if ended < MOST else follows, True
+            time, is_told = max(self._last, length, int(ended)) if ended < MOST else time, True
         elif self._stamp is not None:
-            stamped = self._told(self._stamp)
-            told = stamped + self._shift
-            told = told if told < MOST else follows  # steps that add up to no time
-            if self._clocked and self._stamp.local and begins_summer(self._last - self._shift, stamped):
-                self._shift, told = self._shift - HOUR, told - HOUR
+            told, turned = self._calendar.time_of(self._stamp)
+            if turned and self._clocked:
                 yield from self._placing.close()
-                yield turn(self._last, HOUR)
-            if self._shift_before is not None and self._last - SET_BACK <= stamped + self._shift_before < told:
-                told, self._shift = stamped + self._shift_before, self._shift_before  # a single line was wrong
-                self._shift_before = None
-            if self._clocked and told < self._last - SET_BACK:
-                yield from self._placing.close()
-                back = turn(self._last, told - self._last)
-                self._shift_before, self._shift = self._shift, self._shift + follows - told
-                told = follows
-                yield back
-            is_told = told != self._told_last
-            silence = 0 if len(octets) == 1 and self._plan.octetwise else silence
-            time, self._told_last = told if is_told else self._last + length + silence, told
-            if self._stamp.tick >= COARSE:
-                is_told = True
-                if self._clocked and told > self._last - _BACKWARDS:
-                    time = max(told, self._last + length + silence)
+                yield turn(self._placing.last, turned)
+            told += self._shift
             if not self._clocked:
                 lead = self._last + LINE_END if self._any else 0  # of what stands ahead of the first time
-                self._shift = max(0, length + lead - time)  # counted from a trigger, or since the last line
-                time += self._shift  # no time before 1970
-                self._told_last = time
-            self._clocked = True
+                self._shift = max(0, length + lead - told)  # counted from a trigger, or since the last line
+                told += self._shift  # no time before 1970
+            told = told if 0 <= told < MOST else time  # steps that add up to no time
+            is_told = told != self._told_last
+            by = told + self._stamp.tick if has_time else None
+            time = told if is_told else time
+            self._told_last, self._clocked = told, True
         self._last, self._any = time, True
         chunk = Chunk(time, octets)
-        yield from self._placing.told(chunk, has_time, self._char) if is_told else self._placing.untold(chunk, has_time)
+        if is_told:
+            yield from self._placing.told(chunk, self._char, has_time)
+        else:
+            yield from self._placing.untold(chunk, by, has_time)
 
     def _was_told(self, octets: bytes) -> bool:
         """Whether a message that was completed is the one before, which the tool heard and now tells otherwise."""
         above, before = self._message_last
         return octets == before and above != self._above and not _SENT.search(f"{above} {self._above}")
-
-    def _told(self, stamp: Stamp) -> int:
-        """ns of a stamp; a time of day goes on after midnight."""
-        if self._plan.times.steps:
-            self._clock = max(self._clock, 0) + stamp.time
-            return self._clock
-        if not stamp.daily:
-            time = self._year.time_of(stamp) if stamp.yearly else stamp.time
-            if stamp.dated:
-                self._date, self._clock = time // DAY * DAY - self._day * DAY, time % DAY
-            return time
-        if self._clock >= 0 and stamp.time < self._clock - DAY // 2:
-            self._day += 1
-        self._clock = stamp.time
-        return self._date + self._day * DAY + stamp.time

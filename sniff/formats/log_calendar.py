@@ -1,4 +1,4 @@
-"""What dates of a log leave out: which year it is, and when summer time began. Pure."""
+"""What times of a log leave out: the day of a time of day, the year of a date, and when summer time began. Pure."""
 
 from __future__ import annotations
 
@@ -19,6 +19,9 @@ _MARCH = 59 * DAY
 
 _LONGEST_WAIT = 300 * NS_PER_S
 """ns for which nobody may have spoken when summer time began; after a longer silence it was one."""
+
+_WRITTEN_LATE = 60 * NS_PER_S
+"""ns after midnight within which a line may still have a time of before it."""
 
 _BEGINS, _ENDS = frozenset((3, 4, 9, 10)), frozenset((3, 4, 10, 11))
 """Months in which summer time begins somewhere, and ends."""
@@ -49,6 +52,44 @@ class Year:
     def _time_of(self, stamp: Stamp) -> int:
         is_later = self._is_leap and not stamp.leap_day and stamp.time >= _MARCH
         return self._begin + stamp.time + (DAY if is_later else 0)
+
+
+class Calendar:
+    """What the stamps of a log say, as times that go on over midnight, New Year and the begin of summer time. `steps`:
+    each is the time since the one before."""
+
+    def __init__(self, steps: bool) -> None:
+        self._steps = steps
+        self._year = Year()
+        self._day = 0
+        self._date = 0  # of the stamp that told one last
+        self._clock = -1
+        self._summer = 0  # ns
+        self._last: int | None = None
+
+    def time_of(self, stamp: Stamp) -> tuple[int, int]:
+        """ns of a stamp, and by how much the clock was put forward before it."""
+        time, turned = self._time_of(stamp), 0
+        if self._last is not None and stamp.local and begins_summer(self._last, time):
+            turned = HOUR
+        self._summer, self._last = self._summer - turned, time
+        return time + self._summer, turned
+
+    def _time_of(self, stamp: Stamp) -> int:
+        if self._steps:
+            self._clock = max(self._clock, 0) + stamp.time
+            return self._clock
+        if not stamp.daily:
+            time = self._year.time_of(stamp) if stamp.yearly else stamp.time
+            if stamp.dated:
+                self._date, self._clock = time // DAY * DAY - self._day * DAY, time % DAY
+            return time
+        if self._day and stamp.time > self._clock + DAY - _WRITTEN_LATE:
+            return self._date + (self._day - 1) * DAY + stamp.time
+        if self._clock >= 0 and stamp.time < self._clock - DAY // 2:
+            self._day += 1
+        self._clock = stamp.time
+        return self._date + self._day * DAY + stamp.time
 
 
 def begins_summer(last: int, time: int) -> bool:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 SET_BACK = NS_PER_S
 """ns; by less than that packets come out of order."""
 
-_ROWS_A_STEP = 20
+ROWS_A_STEP = 20
 """Rows for each time that a table's clock is set back; where times go back more often, rows are in another order."""
 
 _NEAR = 10
@@ -34,9 +34,10 @@ _FAR = 1 << 62
 """ns, the year 2116: what says so lies, and is passed on as it is."""
 
 
-def steady(items: Iterable[Item], char: int) -> Iterator[Item]:
-    """Items whose times do not run back by SET_BACK or more. `char`: ns that a character takes on the line."""
-    clock = _Clock(char)
+def steady(items: Iterable[Item], char: int, least: int = SET_BACK, whose: str = "file") -> Iterator[Item]:
+    """Items whose times do not run back by `least` ns or more. `char`: ns that a character takes on the line; `whose`:
+    what the clock is called."""
+    clock = _Clock(char, least, whose)
     for item in items:
         yield from clock.tell(item)
 
@@ -60,49 +61,61 @@ def in_order(rows: Sequence[Chunk], char: int, order: Callable[[Chunk], int]) ->
     """The rows of a table in `order` of a time, ns, from where its clock was set back on as much later. `char`: ns that
     a character takes on the line.
     """
-    begins = _set_back(rows)
+    begins = _set_back([row.time for row in rows])
     shift = latest = 0
     for begin, end in zip((0, *begins), (*begins, len(rows)), strict=True):
         if begin:
             follows = latest + len(rows[begin].octets) * char
             back, shift = latest - rows[begin].time - shift, follows - rows[begin].time
-            yield _step(latest, back)
+            yield _step(latest, back, "file")
         stretch = sorted(rows[begin:end], key=order)
         latest = max((row.time + shift for row in stretch), default=latest)
         yield from (replace(row, time=row.time + shift) for row in stretch) if shift else stretch
 
 
-def _set_back(rows: Sequence[Chunk]) -> list[int]:
-    """The rows that are the first by a clock that was set back; none where the order of rows is another one."""
+def _set_back(times: Sequence[int]) -> list[int]:
+    """Which rows are the first by a clock that was set back; none where the order of rows is another one."""
+    found = steps_back(times)
+    return [] if ROWS_A_STEP * len(found) > len(times) or are_beside(times, found) else found
+
+
+def steps_back(times: Sequence[int], least: int = SET_BACK) -> list[int]:
+    """Which of these times are `least` ns before the one before, and stay so."""
     found = []
-    for at in range(1, len(rows)):
-        before, time = rows[at - 1].time, rows[at].time
-        is_alone = at + 1 < len(rows) and rows[at + 1].time >= max(before, time + SET_BACK)  # written late
-        if time <= before - SET_BACK and not is_alone:
+    for at in range(1, len(times)):
+        before, time = times[at - 1], times[at]
+        is_alone = at + 1 < len(times) and times[at + 1] >= max(before, time + least)  # written late
+        if time <= before - least and not is_alone:
             found.append(at)
-    if not found or _ROWS_A_STEP * len(found) > len(rows):
-        return []
-    stretches = [(rows[begin], rows[end - 1]) for begin, end in pairwise((0, *found, len(rows)))]
-    return [] if any(starmap(_are_beside, pairwise(stretches))) else found
+    return found
 
 
-def _are_beside(one: tuple[Chunk, Chunk], other: tuple[Chunk, Chunk]) -> bool:
-    """Whether two stretches of rows, first and last of each, are of the same time: one list below the other."""
+def are_beside(times: Sequence[int], steps: Sequence[int]) -> bool:
+    """Whether two stretches between these steps, one after the other, are of the same time: lists that stand one below
+    the other."""
+    if not steps:
+        return False
+    stretches = [(times[begin], times[end - 1]) for begin, end in pairwise((0, *steps, len(times)))]
+    return any(starmap(_are_beside, pairwise(stretches)))
+
+
+def _are_beside(one: tuple[int, int], other: tuple[int, int]) -> bool:
+    """The same of two stretches, first and last time of each."""
     (begin, end), (begin_of_other, end_of_other) = one, other
-    near = (end.time - begin.time) // _NEAR
-    return abs(begin_of_other.time - begin.time) <= near or abs(end_of_other.time - end.time) <= near
+    near = (end - begin) // _NEAR
+    return abs(begin_of_other - begin) <= near or abs(end_of_other - end) <= near
 
 
-def _step(time: int, back: int) -> LineEvent:
-    return LineEvent(time, LineEventKind.CLOCK, f"the file's clock goes back by {duration(back)}", -back)
+def _step(time: int, back: int, whose: str) -> LineEvent:
+    return LineEvent(time, LineEventKind.CLOCK, f"the {whose}'s clock goes back by {duration(back)}", -back)
 
 
 class _Clock:
     """`_latest`: the latest time told, None before the first; `_shift`: ns to add; `_before`: to what that was before
     the clock was set back last, until a second time shows that it was."""
 
-    def __init__(self, char: int) -> None:
-        self._char = char
+    def __init__(self, char: int, least: int = SET_BACK, whose: str = "file") -> None:
+        self._char, self._least, self._whose = char, least, whose
         self._latest: int | None = None
         self._shift = 0
         self._before: int | None = None
@@ -115,12 +128,12 @@ class _Clock:
             return
         if isinstance(item, LineEvent) or not item.octets or self._latest is None:
             pass
-        elif self._before is not None and self._latest - SET_BACK < item.time + self._before < time:
+        elif self._before is not None and self._latest - self._least < item.time + self._before < time:
             self._shift, time = self._before, item.time + self._before  # a single one was wrong
             self._before = None
-        elif time <= self._latest - SET_BACK:
+        elif time <= self._latest - self._least:
             back, follows = self._latest - time, self._latest + len(item.octets) * self._char
-            yield _step(self._latest, back)
+            yield _step(self._latest, back, self._whose)
             self._before, self._shift = self._shift, self._shift + follows - time
             time = follows
         if isinstance(item, Chunk) and item.octets:

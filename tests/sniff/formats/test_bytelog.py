@@ -14,7 +14,7 @@ from dissectors.line import NS_PER_S, LineSettings
 from sniff.bus.offline import settled
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import LineEvent, LineEventKind, with_settings
-from sniff.formats import bytelog, read
+from sniff.formats import bytelog, read, table_reads
 from tests.seeds import examples
 
 REQUEST, ANSWER = bytes.fromhex("010300000002C40B"), bytes.fromhex("01030400D7001ACBC0")
@@ -230,9 +230,9 @@ def test_any_change_is_no_traceback(tmp_path: Path, kind: str, place: float, tex
 def test_a_table_too_long_for_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "long.csv"
     path.write_text("time,data\n" + "".join(f"0.{number:03},01\n" for number in range(50)))
-    monkeypatch.setattr(bytelog, "MOST_ROWS", 50)
+    monkeypatch.setattr(table_reads, "MOST_ROWS", 50)
     assert len(list(bytelog.read(path).items())) == 50
-    monkeypatch.setattr(bytelog, "MOST_ROWS", 49)
+    monkeypatch.setattr(table_reads, "MOST_ROWS", 49)
     with pytest.raises(CaptureError, match="over 49 rows; cut it into pieces"):
         bytelog.read(path)
 

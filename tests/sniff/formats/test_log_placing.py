@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 from pathlib import Path
 
+import pytest
+
 from dissectors.frame import Chunk
-from dissectors.line import MS
+from dissectors.line import MS, NS_PER_S
 from sniff.formats import read
 
 ASKED, ANSWERED = "07 04 00 10 00 02 70 68", "07 04 04 00 EB 01 2C ED FD"
@@ -65,3 +68,26 @@ def test_octets_of_one_millisecond_stay_together(tmp_path: Path) -> None:
     assert b"".join(chunk.octets for chunk in chunks) == bytes.fromhex(ASKED) * 4
     assert all(before.time <= after.time for before, after in pairwise(chunks))
     assert all(after.time - before.time < 3 * MS for before, after in pairwise(chunks[:8]))
+
+
+@pytest.mark.parametrize("per_second", [1, 20, 90, 400, 1500])
+@pytest.mark.parametrize("tick", [NS_PER_S, 10 * MS, MS])
+def test_each_read_lies_within_what_its_clock_says(per_second: int, tick: int, tmp_path: Path) -> None:
+    """However many come while it counts once: more than a slow line has time for, or than wait for the next time."""
+    told = [number * NS_PER_S // per_second // tick * tick for number in range(3 * per_second)]
+    text = "".join(f"10:00:{at // NS_PER_S:02}.{at % NS_PER_S:09}"[:15] + f" {ASKED}\n" for at in told)
+    if tick == NS_PER_S:
+        text = text.replace(".000000", "")
+    elif tick == 10 * MS:
+        text = re.sub(r"(\.\d\d)0000", r"\1", text)
+    chunks = chunks_of(tmp_path / "x.log", text)
+    begin = chunks[0].time - told[0]
+    assert all(0 <= chunk.time - begin - at <= tick for chunk, at in zip(chunks, told, strict=True))
+    assert all(before.time <= after.time for before, after in pairwise(chunks))
+
+
+def test_lines_around_midnight_that_are_written_late(tmp_path: Path) -> None:
+    clocks = ["23:59:59.900", "00:00:00.010", "23:59:59.990", "00:00:00.050", "23:59:58.500", "00:00:00.900"]
+    times = [chunk.time for chunk in chunks_of(tmp_path / "x.log", "".join(f"{one} {ASKED}\n" for one in clocks))]
+    assert times == sorted(times)
+    assert times[5] - times[0] == NS_PER_S

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -61,14 +63,32 @@ def test_columns_tell_the_same(seed: int, tmp_path: Path) -> None:
     assert spread(capture.blocks()) == spread(blocks_of(capture.items()))
 
 
-def as_table(path: Path, rows: list[tuple[int, bytes]]) -> list[Chunk | LineEvent]:
+Rows = list[tuple[int, bytes]]
+
+
+def as_table(path: Path, rows: Rows) -> list[Chunk | LineEvent]:
+    path = path.with_suffix(".csv")
     path.write_text("time,data\n" + "".join(f"{time / NS_PER_S:.3f},{octets.hex(' ')}\n" for time, octets in rows))
     return list(read(path).items())
 
 
+def as_log(path: Path, rows: Rows) -> list[Chunk | LineEvent]:
+    path = path.with_suffix(".log")
+    stamps = [datetime.fromtimestamp(time / NS_PER_S, UTC) for time, _ in rows]
+    path.write_text(
+        "".join(f"{at:%F %T.%f}Z {octets.hex(' ')}\n" for at, (_, octets) in zip(stamps, rows, strict=True))
+    )
+    return list(read(path).items())
+
+
+Written = Callable[[Path, Rows], list[Chunk | LineEvent]]
+as_written = pytest.mark.parametrize("written", [as_table, as_log])
+
+
+@as_written
 @pytest.mark.parametrize("back", [3, 5, 12, 3600])
-def test_a_table_goes_on_where_the_clock_was_set_back(back: float, tmp_path: Path) -> None:
-    items = as_table(tmp_path / "x.csv", packets(400, {200: -back}))
+def test_a_table_or_log_goes_on_where_the_clock_was_set_back(back: float, written: Written, tmp_path: Path) -> None:
+    items = written(tmp_path / "x", packets(400, {200: -back}))
     (event,) = (item for item in items if isinstance(item, LineEvent))
     assert event.kind is LineEventKind.CLOCK
     told = [item for item in items if isinstance(item, Chunk)]
@@ -77,15 +97,32 @@ def test_a_table_goes_on_where_the_clock_was_set_back(back: float, tmp_path: Pat
     assert told[200].time > told[199].time
 
 
+@as_written
 @pytest.mark.parametrize("late", [0, 5])
-def test_lists_of_directions_below_one_another_are_one(late: float, tmp_path: Path) -> None:
+def test_lists_of_directions_below_one_another_are_one(late: float, written: Written, tmp_path: Path) -> None:
     made = packets(400, {})
     asked, answered = made[::2], [row for row in made[1::2] if row[0] >= BEGIN + late * NS_PER_S]
-    items = as_table(tmp_path / "x.csv", asked + answered)
+    items = written(tmp_path / "x", asked + answered)
     assert [(item.time, item.octets) for item in items] == [(time, octets) for time, octets in sorted(asked + answered)]
+
+
+@as_written
+def test_what_a_thread_hands_over_late_lies_at_its_time(written: Written, tmp_path: Path) -> None:
+    made = packets(400, {})
+    late = [row for at in range(0, 400, 5) for row in (*made[at : at + 3], made[at + 4], made[at + 3])]
+    assert [item.time for item in written(tmp_path / "x", late)] == [time for time, _ in made]
+
+
+def test_a_program_that_was_started_anew_is_no_list_of_the_same_time(tmp_path: Path) -> None:
+    made = [(time - BEGIN, octets) for time, octets in packets(40, {})]
+    path = tmp_path / "x.log"
+    path.write_text("".join(f"[{time / NS_PER_S:.3f}] {octets.hex(' ')}\n" for time, octets in made + made[:-5]))
+    items = list(read(path).items())
+    assert [item.octets for item in items if isinstance(item, Chunk)] == [octets for _, octets in made + made[:-5]]
+    assert [item.time for item in items] == sorted(item.time for item in items)
 
 
 def test_rows_in_another_order_are_sorted(tmp_path: Path) -> None:
     made = packets(400, {})
     mixed = random.Random(1).sample(made, len(made))
-    assert [item.time for item in as_table(tmp_path / "x.csv", mixed)] == [time for time, _ in made]
+    assert [item.time for item in as_table(tmp_path / "x", mixed)] == [time for time, _ in made]
