@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from dissectors.findings import Finding
 from dissectors.profibus.record import RequestsRecord
 from dissectors.profibus.slave_watch import SlaveView
 
@@ -17,3 +20,17 @@ def watchdog_words(slave: SlaveView) -> str:
     """What its watchdog is set to; empty where nobody said."""
     watchdog = "" if slave.given is None else slave.given.watchdog_words
     return f"; its watchdog is set to {watchdog}" if watchdog else ""
+
+
+def answered_again(finding: Finding, record: RequestsRecord, is_timed: bool) -> Finding:
+    """What is found of requests without answer, where each is answered when it is sent again. `is_timed`: times tell
+    that from an echo."""
+    echo = "" if is_timed else "; or something on the line gives each request back (an echo)"
+    return replace(
+        finding,
+        seen=f"{finding.seen}; {record.again} were answered when they were sent again",
+        means="its answers come later than its master waits (slot time), which takes them for answers to the repeat; "
+        f"or it misses each first request{echo}",
+        next="the slot time of the project against the delay of the station (MaxTsdr in its GSD) and of repeaters, "
+        "converters and optical links on the way",
+    )

@@ -13,11 +13,12 @@ from dissectors.last_silence import fallen_silent
 from dissectors.line import NS_PER_S, Timing
 from dissectors.profibus.blame import ONE_STATION, SentOctets
 from dissectors.profibus.diagnosis_findings import codes_of, diagnosis_grave, diagnosis_seen, start_found
-from dissectors.profibus.finding_words import unheard_words, watchdog_words
+from dissectors.profibus.finding_words import answered_again, unheard_words, watchdog_words
 from dissectors.profibus.record import RequestsRecord, joined
 from dissectors.profibus.ring import MasterView, Ring, RingWindow
 from dissectors.profibus.rules import RULES, usual_tsdr
 from dissectors.profibus.slave_watch import SlaveView
+from dissectors.profibus.telegram import SYN
 from dissectors.profibus.watch import BusWatch, Notice
 from dissectors.subject import BUS, Subject, station
 from dissectors.tracker import Placement, Transaction, Verdict
@@ -50,6 +51,7 @@ class ProfibusFindings:
         self.watch = self.watches(timing, self._noticed)
         self._usual, self._tolerance = timing.line.bits(usual_tsdr(timing.line.baud)), timing.line.bits(_TOLERANCE)
         self._has_times = timing.has_times
+        self._is_timed = timing.has_times and timing.latency < timing.line.bits(SYN)
         self._most: Callable[[int], int | None] | None = None
         self._limits: dict[int, int] = {}
         self.records: dict[int, RequestsRecord] = defaultdict(RequestsRecord)
@@ -163,7 +165,7 @@ class ProfibusFindings:
             seen = f"{silent.count} of {total} requests without answer"
             seen += busiest.words(silent.quarters, silent.count, total, self._span) + unheard_words(record)
             finding = silent.found(RULES["PB002"], who, seen, grave)
-            finding = _answered_again(finding, record) if record.answers_repeats else finding
+            finding = answered_again(finding, record, self._is_timed) if record.answers_repeats else finding
             yield fallen_silent(finding, record.silence, self.watch.ring().last)
         if record.twice.count:
             often = record.twice.count >= _LEAST and record.twice.count >= _SHARE * total
@@ -373,18 +375,6 @@ def _grave(count: int, total: int, when: Tally | None = None, span: int = 0) -> 
     many = count >= _LEAST and count >= _SHARE * total
     is_fault = when is not None and busiest.is_fault(when.quarters, total, span)
     return Severity.WARNING if many or is_fault else Severity.NOTE
-
-
-def _answered_again(finding: Finding, record: RequestsRecord) -> Finding:
-    """What is found of requests without answer, where each is answered when it is sent again."""
-    return replace(
-        finding,
-        seen=f"{finding.seen}; {record.again} were answered when they were sent again",
-        means="its answers come later than its master waits (slot time), which takes them for answers to the repeat; "
-        "or it misses each first request",
-        next="the slot time of the project against the delay of the station (MaxTsdr in its GSD) and of repeaters, "
-        "converters and optical links on the way",
-    )
 
 
 def _of_polls(tally: Tally, address: int, seen: str, view: MasterView) -> Finding:

@@ -95,7 +95,7 @@ class RequestsRecord:
         if verdict is Verdict.ANSWERED_TWICE:
             self.twice.add(closed.start, closed.request, closed.response)
             return
-        if closed.request is None:
+        if closed.request is None or verdict is Verdict.ECHO:
             return
         self.requests += 1
         self.exchanged += closed.kind == _EXCHANGE

@@ -13,6 +13,9 @@ from dissectors.quick_values import quickly_made
 
 SD1, SD2, SD3, SD4, SC, ED = 0x10, 0x68, 0xA2, 0xDC, 0xE5, 0x16
 BROADCAST = 127
+SYN = 33
+"""Bit times of silence that a master keeps before each request, at least (TSYN)."""
+
 HIGHEST = 126
 """The highest address of a station."""
 

@@ -6,6 +6,7 @@
                   │ ───► next request, token, silence                          no answer; a poll: one-way
     SDN, to one or to all                                                      data, broadcast
     token                                                                      one-way
+    a request, the same octets at once        echo: no master repeats within the silence that it owes
     answer without a request                  late after no answer; answered twice, echo after an answer; else unasked
 
 A request with the frame count bit in use and the same as in the one before it, to the same station, is that one again:
@@ -23,7 +24,7 @@ from dissectors.line import NS_PER_S, Timing
 from dissectors.plain_tracker import closed_exchange
 from dissectors.profibus.control import Control
 from dissectors.profibus.header import meant
-from dissectors.profibus.telegram import parse
+from dissectors.profibus.telegram import SYN, parse
 from dissectors.profibus.turn import Due, Turn
 from dissectors.tracker import NOTHING_TRACKED, Placement, Tracked, Transaction, Verdict
 
@@ -62,7 +63,7 @@ class ProfibusTracker:
     """The tracker of one bus."""
 
     def __init__(self, timing: Timing) -> None:
-        self._patience = PATIENCE + timing.latency
+        self._patience, self._syn = PATIENCE + timing.latency, timing.line.bits(SYN)
         self._tx = 0
         self._open: _Asked | None = None
         self._past: _Asked | None = None  # the last request, once it is closed
@@ -149,6 +150,8 @@ class ProfibusTracker:
         self._is_clear = self._is_clear or asked
 
     def _ask(self, no: int, frame: Frame, header: Header, before: tuple[Transaction, ...]) -> Tracked:
+        if self._open is not None and self._is_echo(frame, self._open.frame):
+            return self._echo(no, frame, header, self._open, before)
         before += self._give_up()
         control = parse(meant(frame)).control
         asked = _Asked(self._next(), no, frame, header, control)
@@ -158,6 +161,15 @@ class ProfibusTracker:
         self._is_clear = frame.ok
         self._open = asked
         return Tracked(_placed(no, asked.id, header), before)
+
+    def _is_echo(self, frame: Frame, asked: Frame) -> bool:
+        return frame.octets == asked.octets and frame.ok and frame.start - asked.end + asked.slack < self._syn
+
+    def _echo(self, no: int, frame: Frame, header: Header, of: _Asked, before: tuple[Transaction, ...]) -> Tracked:
+        """What the line gives back; the request stays open."""
+        tx, to = self._next(), header.destination
+        echo = Transaction(tx, to, header.kind, no, None, Verdict.ECHO, frame.start, frame.end, of=of.id)
+        return Tracked(_placed(no, tx, header), (*before, echo))
 
     def _repeats(self, asked: _Asked, earlier: _Asked) -> bool:
         """Whether a request is the one directly before once more: a master repeats at once, or not at all."""

@@ -18,7 +18,7 @@ from dissectors.profibus.ring import MasterView, Ring, RingWindow, SlaveRow, rin
 from dissectors.profibus.services import Service, service_of
 from dissectors.profibus.slave_state import SlaveState
 from dissectors.profibus.slave_watch import SlaveView
-from dissectors.profibus.telegram import HIGHEST, Telegram, parse
+from dissectors.profibus.telegram import HIGHEST, SYN, Telegram, parse
 
 CLEAR_LONG = 5 * NS_PER_S
 """ns of data exchange in Clear that are more than a start."""
@@ -121,7 +121,7 @@ class BusWatch:
         self._heard = self._slack = 0  # end of the row before, and by how much it may have been earlier
         self._timing = timing
         self._least_claim = timing.line.bits(_LEAST_CLAIM)
-        self._slot = timing.line.bits(LONGEST_SLOT)
+        self._slot, self._syn = timing.line.bits(LONGEST_SLOT), timing.line.bits(SYN)
         self._holder: int | None = None
         self._interruption: _Interruption | None = None  # until it is known whether a token was missed at this tap
         self._robbed: int | None = None  # who lost the token to another one that gave it up; until it speaks in turn
@@ -231,7 +231,7 @@ class BusWatch:
 
     def _pass(self, no: int, token: Telegram, frame: Frame) -> None:
         source, to = token.source, token.destination
-        if source is None or to is None:
+        if source is None or to is None or (source != to and self._token == (source, to) and self._is_copy(frame)):
             return
         self._unanswered(frame.start)
         self._newest = b""
@@ -294,11 +294,18 @@ class BusWatch:
             self._tell(Notice.OUT_OF_TURN, cut.by, cut.no, cut.time)
             self._interruption, self._holder = None, source
 
+    def _is_copy(self, frame: Frame) -> bool:
+        """Whether the same octets as before come so soon that the line gives them back."""
+        return frame.start - self._heard + self._slack < self._syn
+
     def _is_at_once(self, frame: Frame) -> bool:
         """Whether it is sure that less silence was before a frame than any master waits before it claims the token."""
         return frame.start - self._heard + self._slack < self._least_claim
 
     def _ask(self, no: int, asked: Telegram, frame: Frame) -> None:
+        is_open = self._asked is not None and self._asked[1] is not Service.FDL_STATUS
+        if is_open and frame.octets == self._newest and self._is_copy(frame):
+            return
         self._unanswered(frame.start)
         source, to = asked.source, asked.destination
         assert source is not None

@@ -42,7 +42,7 @@ class EchoesHeard:
         if transaction.verdict is Verdict.ECHO:
             self._add(transaction.start, transaction.request, transaction.response, transaction.of)
         elif transaction.request is not None:
-            self._asked += 1
+            self._asked += transaction.verdict is not Verdict.DATA  # a token is no request
             self._close(transaction.id, transaction.verdict in _ANSWERED)
 
     def settle_many(self, closed: TransactionColumns) -> None:
@@ -53,7 +53,7 @@ class EchoesHeard:
 
         is_echo = closed.verdict == VERDICTS.index(Verdict.ECHO)
         asks = (closed.request != NONE) & ~is_echo
-        self._asked += int(asks.sum())
+        self._asked += int((asks & (closed.verdict != VERDICTS.index(Verdict.DATA))).sum())
         if not self._pending and not is_echo.any():
             return
         is_answered = np.isin(closed.verdict, [VERDICTS.index(one) for one in _ANSWERED])

@@ -215,7 +215,7 @@ _ALL = (
         "with nearly every one: a warning from three on, and half of the requests.",
         "a repeater or converter that gives back what it hears, or an adapter that hears itself",
         "the echo setting of the master's adapter or of the converter; it halves the time left on the bus",
-        explains=("N2011", "N2013", "LN204"),
+        explains=("N2011", "N2013", "PB018", "LN204"),
     ),
     Rule(
         "LN206",
@@ -298,7 +298,7 @@ _ALL = (
         "many there less than once in ten. A warning where they came back.",
         "something they share: a supply, a fuse, a stretch of cable, a repeater",
         "what these stations have in common: supply, cabinet, the piece of cable behind the last one that answers",
-        explains=("MB001", "MB002", "MB003", "MB020", "MB104", "MB105", "N2005", "N2010", "N2015"),
+        explains=("MB001", "MB002", "MB003", "MB020", "MB104", "MB105", "N2005", "N2010", "N2015", "PB001", "PB002"),
     ),
     Rule(
         "LN401",

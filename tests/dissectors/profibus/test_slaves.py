@@ -81,6 +81,14 @@ def test_who_answers_each_repeat_is_asked_too_soon() -> None:
     assert "slot time" not in told.means
 
 
+def test_what_the_line_gives_back_is_no_repeat() -> None:
+    answer = exchange(0)[1]
+    echoed = [one for at in range(12) for one in (exchange(at % 2)[0], (0, exchange(at % 2)[0][1]), answer)]
+    judge = judged([*exchanges(2), *echoed])
+    assert found(judge, "PB002") is None
+    assert judge.watch.slaves[5].counts.repeats == 0
+
+
 def test_repeats_of_a_quarter_of_an_hour_are_no_chance_of_the_night() -> None:
     judge = judged([*exchanges(3), *exchange(1, wait=8 * 3_600_000)])
     record = judge.records[5]
