@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from dissectors.findings import Finding, Severity, Tally, counted
+from dissectors.findings import Finding, Severity, Tally, counted, times
 from dissectors.line import NS_PER_S
 from dissectors.tracker import PASSING, Transaction, Verdict
 from dissectors.words import duration, elapsed
@@ -28,6 +28,26 @@ BY_CHANCE = 0.1
 """Chance below which losses in one part of a capture are no chance: each falls anywhere in it."""
 
 
+LOSSES_KEPT = 16
+SHOWN = 3
+OFTEN = 3
+"""So many times the same ones is no single event that is over."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Loss:
+    """`together`: last answer, first miss, back or 0, station, of each; `moment`: when they were missed; ns."""
+
+    together: list[tuple[int, int, int, int]]
+    moment: int
+
+    @property
+    def back(self) -> int | None:
+        """When all were there again, ns; None where one is not."""
+        backs = [one[2] for one in self.together]
+        return max(backs) if all(backs) else None
+
+
 @dataclass(slots=True)
 class _Station:
     """How a station answers. `gone`: between which moments it stopped, while it does not answer."""
@@ -37,7 +57,9 @@ class _Station:
     missed: int = 0
     first_missed: int = 0
     rows: list[int] = field(default_factory=list)
-    losses: deque[tuple[int, int, int]] = field(default_factory=lambda: deque(maxlen=16))  # last answer, miss, back (0)
+    losses: deque[tuple[int, int, int]] = field(
+        default_factory=lambda: deque(maxlen=LOSSES_KEPT)
+    )  # last answer, miss, back (0)
 
 
 class LostTogether:
@@ -111,8 +133,11 @@ class LostTogether:
 
     def findings(self, first: int, now: int) -> Iterator[Finding]:
         """What there is to say so far. `first`, `now`: ns, of the first octet of the capture and the newest."""
+        by_names: dict[tuple[int, ...], list[_Loss]] = {}
         for together, names, moment in self.losses(first, now):
-            yield self._lost(together, names, moment, first)
+            by_names.setdefault(tuple(names), []).append(_Loss(together, moment))
+        for stations, losses in by_names.items():
+            yield self._lost(losses[0], stations, first) if len(losses) == 1 else self._often(losses, stations, first)
 
     def losses(self, first: int, now: int) -> Iterator[tuple[list[tuple[int, int, int, int]], list[int], int]]:
         """The same as values: losses (last answer, first miss, back or 0: ns; station), stations, the moment."""
@@ -137,21 +162,41 @@ class LostTogether:
         """Stations that answered now and then."""
         return sum(station.answered >= ANSWERED_BEFORE for station in self._stations.values())
 
-    def _lost(self, together: list[tuple[int, int, int, int]], names: list[int], moment: int, first: int) -> Finding:
-        tally = Tally()
-        for number in names:
-            tally.add(moment, *self._stations[number].rows[:2])
-        others = [one for number, one in self._stations.items() if number not in names and one.last_answer > moment]
-        who = "all of them" if not others else f"{counted(len(others), 'other station')} went on"
-        window = max(loss[1] for loss in together) - min(loss[0] for loss in together)
+    def _lost(self, loss: _Loss, names: tuple[int, ...], first: int) -> Finding:
+        window = max(one[1] for one in loss.together) - min(one[0] for one in loss.together)
         is_one = window < MOMENT or not self._has_times
         when = "at the same moment" if is_one else f"within {duration(window)}"
-        when += f", {elapsed(moment - first)} after the begin" if self._has_times else ""
-        seen = f"{len(names)} stations ({', '.join(map(str, names))}) stopped answering {when}: {who}"
-        back = [loss[2] for loss in together if loss[2]]
-        if len(back) == len(together):
-            after = f" after {elapsed(max(back) - moment)}" if self._has_times else ""
-            seen += f"; they were back{after}"
-        severity = Severity.WARNING if back else Severity.ERROR
+        when += f", {elapsed(loss.moment - first)} after the begin" if self._has_times else ""
+        back = loss.back
+        after = f" after {elapsed(back - loss.moment)}" if back is not None and self._has_times else ""
+        came = "" if back is None else f"; they were back{after}"
+        return self._found([loss], names, f"{when}: {self._others(names, loss.moment)}{came}")
+
+    def _often(self, losses: list[_Loss], names: tuple[int, ...], first: int) -> Finding:
+        """The same stations again and again, of which the last losses of each are known."""
+        least = "at least " if any(len(self._stations[name].losses) == LOSSES_KEPT for name in names) else ""
+        said = [elapsed(loss.moment - first) for loss in losses[:SHOWN]]
+        more = " …" if len(losses) > SHOWN else ""
+        when = f", {', '.join(said)}{more} after the begin" if self._has_times else ""
+        away = [loss.back - loss.moment for loss in losses if loss.back is not None]
+        came = f"; they were back after {elapsed(max(away))} at most" if away and self._has_times else ""
+        came += "; they are not back from the last time" if losses[-1].back is None else ""
+        others = self._others(names, losses[-1].moment)
+        finding = self._found(losses, names, f"together {least}{times(len(losses))}{when}: {others}{came}")
+        return replace(finding, count=len(losses))
+
+    def _others(self, names: tuple[int, ...], moment: int) -> str:
+        others = [one for number, one in self._stations.items() if number not in names and one.last_answer > moment]
+        return "all of them" if not others else f"{counted(len(others), 'other station')} went on"
+
+    def _found(self, losses: list[_Loss], names: tuple[int, ...], words: str) -> Finding:
+        """A warning where they came back each time, and that was seldom."""
+        tally = Tally()
+        for loss in losses:
+            for number in names:
+                tally.add(loss.moment, *(self._stations[number].rows[:2] if loss is losses[-1] else ()))
+        is_back = any(one[2] for one in losses[-1].together)
+        severity = Severity.WARNING if is_back and len(losses) < OFTEN else Severity.ERROR
+        seen = f"{len(names)} stations ({', '.join(map(str, names))}) stopped answering {words}"
         finding = tally.found(RULES["LN305"], "bus", seen, severity)
-        return replace(finding, count=len(names), stations=tuple(names), lasts=len(back) < len(together))
+        return replace(finding, count=len(names), stations=names, lasts=losses[-1].back is None)

@@ -5,6 +5,9 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any, cast
 
+import pytest
+
+from dissectors.findings import Severity
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.lost_together import LostTogether
 
@@ -71,3 +74,19 @@ def test_of_a_log_without_times_no_moment_is_told() -> None:
     (finding,) = together.findings(0, 60 * S)
     assert finding.seen.startswith("2 stations (1, 2) stopped answering at the same moment: 1 other station went on")
     assert finding.seen.endswith("they were back")
+
+
+@pytest.mark.parametrize(
+    ("every", "severity", "words"),
+    [(60, Severity.ERROR, "together 5 times, 5"), (120, Severity.WARNING, "together twice, ")],
+)
+def test_the_same_stations_again_and_again_are_one_finding(every: int, severity: Severity, words: str) -> None:
+    together = LostTogether()
+    for second in range(300):
+        for station in (1, 2, 3):
+            together.settle(asked(station, second + station / 10, station == 3 or second % every < every - 8))
+    together.settle(asked(1, 301, answered=True))
+    together.settle(asked(2, 301, answered=True))
+    (finding,) = together.findings(0, 301 * S)
+    assert words in finding.seen
+    assert (finding.stations, finding.severity) == ((1, 2), severity)
