@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -34,6 +35,7 @@ SILENT_SHARE = 0.1
 
 SILENT_SHOWN = 5
 ROWS_AROUND = 50
+BREAKS_KEPT = 256
 
 
 class Silences:
@@ -48,6 +50,7 @@ class Silences:
         self._longest = 0  # of all that were long, ns
         self._hole: int | None = None  # ns; no row has ended since
         self._asked = False  # the newest row is a request
+        self._broken: deque[int] = deque(maxlen=BREAKS_KEPT)  # rows that end with a break
 
     def see(self, event: Event, asks: bool) -> None:
         """Take the next row. `asks`: whether a master without an address sent it."""
@@ -80,6 +83,10 @@ class Silences:
         self.now = max(self.now, int(ends.max()))
         self._asked = bool(asks[-1])
         self._rows += len(starts)
+
+    def see_break(self, no: int) -> None:
+        """That row ends with a break: the line is held low behind it, nobody knows for how long."""
+        self._broken.append(no)
 
     def miss(self, time: int) -> None:
         """Octets may be lost at `time`, ns: over a hole nothing is known. Rows that it ended may still come."""
@@ -139,7 +146,23 @@ class Silences:
             f"not one octet for {most}{elapsed(longest)}, {often} times as long as pauses are here; from {at} "
             "on, and everything went on as before"
         )
-        yield tally.found(RULES["LN304"], "bus", seen)
+        finding = tally.found(RULES["LN304"], "bus", seen)
+        low = sum(row in self._broken for _, _, row in whole)
+        yield _held_low(finding, low, len(whole)) if low else finding
+
+
+def _held_low(finding: Finding, low: int, silences: int) -> Finding:
+    """What is found of silences, where some begin with a break."""
+    which = ("it" if silences == 1 else "each") + " begins" if low == silences else f"{low} of the {silences} begin"
+    means = (
+        "the line was held low, or somebody was at its wires: a short circuit, a plug, a driver that does not let go"
+    )
+    return replace(
+        finding,
+        seen=f"{finding.seen}; {which} with a break, where the line goes low",
+        means=means if low == silences else f"{means}; or {finding.means}",
+        next="who was at the wires then; each station taken off in turn, if it comes again",
+    )
 
 
 def _is_regular(spans: list[int]) -> bool:

@@ -151,6 +151,8 @@ class TimePatterns:
         """Take a row that `take` left out, at its place among those of `see_good`."""
         is_good = isinstance(event, Frame) and event.ok
         wrong = next((mark for mark in event.marks if mark.error & _MARKS), None)
+        if any(mark.error & LineError.BREAK and mark.offset == len(event.octets) - 1 for mark in event.marks):
+            self._silences.see_break(no)
         if is_good and wrong is None:
             self._good += 1
             self._good_since += 1

@@ -76,3 +76,18 @@ def test_a_night_has_more_silences_than_an_hour(apart: int, is_told: bool) -> No
     assert bool(silences.whole()) is is_told
     if is_told:
         assert all(" … (" in one.seen for one in silences.findings())
+
+
+@pytest.mark.parametrize("by_columns", [False, True])
+@pytest.mark.parametrize(("low", "words"), [((), ""), ((100,), "1 of the 2 begin"), ((100, 200), "each begins")])
+def test_a_silence_that_begins_with_a_break_is_not_the_masters(
+    low: tuple[int, ...], words: str, by_columns: bool
+) -> None:
+    silences = Silences()
+    for number in range(300):
+        _row(silences, number * EVERY + number // 100 * (20 + number // 200) * NS_PER_S, number > 0 and by_columns)
+        if number + 1 in low:
+            silences.see_break(number + 1)
+    (told,) = silences.findings()
+    assert (words in told.seen) if words else ("break" not in told.seen)
+    assert ("held low" in told.means) is bool(low)
