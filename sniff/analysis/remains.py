@@ -9,7 +9,7 @@ from typing import Final
 
 from dissectors.findings import Finding, Severity, Tally, counted
 from dissectors.frame import Chunk, Noise
-from dissectors.words import percent
+from dissectors.words import duration, percent
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, other_protocol
 from sniff.analysis.sender_findings import BUS
@@ -22,6 +22,12 @@ MOST_KEPT: Final = 16
 
 MORE_THAN_REMAINS: Final = 0.3
 """Of all octets; so much is no mere remains of somebody's damaged frames."""
+
+WITHOUT_END: Final = 2048
+"""Octets one behind the other that are longer than any frame, whose head was damaged."""
+
+_FILLED: Final = 0.9
+"""The part of the time that they fill at least."""
 
 _WHO_SPEAKS_IT: Final = (
     "which device still speaks the other protocol: its protocol setting; it does not belong on this line"
@@ -40,6 +46,8 @@ class Remains:
         self._sampled = 0
         self._fit: tuple[int, Fit | None] = (0, None)  # asked when so many octets were sampled
         self._instead: Counter[str] = Counter()  # by whose answers were due
+        self._run = (0, 0, 0)  # octets one behind the other up to now, since when and until when, ns
+        self._longest = (0, 0)  # of all such: octets, ns
 
     def add(self, no: int, noise: Noise, asked: str | None = None) -> None:
         """Take the next one; `asked`: whose answer was due."""
@@ -47,11 +55,22 @@ class Remains:
         if asked is not None and (asked in self._instead or len(self._instead) < MOST_KEPT):
             self._instead[asked] += 1
         self.octets += len(noise.octets)
+        self._go_on(noise)
         if len(self._first) < MOST_KEPT and len(noise.octets) <= 300:
             self._first.append(noise.octets)
         if self._sampled < SAMPLE_OCTETS:
             self._sample.append(Chunk(noise.end, noise.octets[:SAMPLE_OCTETS], noise.marks))
             self._sampled += len(noise.octets)
+
+    def _go_on(self, noise: Noise) -> None:
+        """Whether it is directly behind the stretch before it, as far as the adapter tells."""
+        octets, begin, end = self._run
+        if not octets or noise.start - end > 2 * self._session.line.char + self._session.adapter.latency:
+            octets, begin = 0, noise.start
+        octets += len(noise.octets)
+        self._run = octets, begin, noise.end
+        if octets > self._longest[0] and octets * self._session.line.char >= _FILLED * (noise.end - begin):
+            self._longest = octets, noise.end - begin
 
     def take_back(self, newest: Sequence[int]) -> None:
         """Count the newest ones no more, of so many octets each: they are pieces of a frame."""
@@ -71,7 +90,7 @@ class Remains:
         )
         words += f", {count} of them in place of its answers" if count else ""
         severity = None if share >= 0.02 and self._tally.count > 1 else Severity.NOTE
-        finding = self._told(self._tally.found(RULES["LN204"], name, words, severity))
+        finding = self._told(self._tally.found(RULES["LN204"], name, words, severity), share)
         return replace(finding, is_told_apart=True) if share >= MORE_THAN_REMAINS else finding
 
     def _of_one(self, heard: Set[str]) -> tuple[str, int]:
@@ -84,8 +103,8 @@ class Remains:
             return BUS, 0
         return name, count
 
-    def _told(self, finding: Finding) -> Finding:
-        """With what the stretches have in common."""
+    def _told(self, finding: Finding, share: float) -> Finding:
+        """With what the stretches have in common. `share`: of all octets, that they are."""
         rests, line = self._first, self._session.line
         same, often = Counter(rests).most_common(1)[0] if rests else (b"", 0)
         if often >= 3 and 2 * often >= len(rests):
@@ -107,7 +126,7 @@ class Remains:
             return replace(finding, seen=f"{finding.seen}; {fit.seen}", means=means, next=settle, is_told_apart=True)
         factor = slower_by(rests, line)
         if not factor:
-            return finding
+            return self._without_end(finding) if share < 0.5 else finding  # else nothing can be read here
         rate = f"{factor} times slower" if factor < 12 else "over 10 times slower"
         rate += f", at about {line.baud // factor} Bd" if factor < 12 and not self._session.line_is_assumed else ""
         return replace(
@@ -116,6 +135,19 @@ class Remains:
             means="a device that speaks with another baud rate, by its own protocol or by a wrong setting",
             next="which station answers so: its baud rate and protocol; two stations with one address look otherwise",
             is_told_apart=True,
+        )
+
+    def _without_end(self, finding: Finding) -> Finding:
+        """Where they are longer than any frame, that somebody does not stop."""
+        octets, lasted = self._longest
+        if octets < WITHOUT_END or not self._session.has_times:
+            return finding
+        return replace(
+            finding,
+            seen=f"{finding.seen}; up to {octets} one behind the other, for {duration(lasted)}, longer than any frame",
+            means="somebody sends and does not stop: a driver that is stuck, a device that starts, crashed or prints "
+            "its log on this port; nobody else can speak meanwhile",
+            next="what restarted or was plugged in at that time; while it lasts, take the stations off one by one",
         )
 
     def _other_protocol(self) -> Fit | None:

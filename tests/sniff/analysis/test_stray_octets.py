@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from random import Random
 
 import pytest
 
@@ -59,6 +60,21 @@ def test_how_often_stretches_are_the_same_is_said_of_those_that_are_kept(many: i
     found = remains.found(10_000)
     assert found is not None
     assert said in found.seen
+
+
+@pytest.mark.parametrize(
+    ("many", "gap", "of_all", "is_told"),
+    [(9, 0, 10_000, True), (7, 0, 10_000, False), (9, 4, 10_000, False), (9, 0, 4_000, False)],
+)
+def test_somebody_who_does_not_stop_is_told(many: int, gap: int, of_all: int, is_told: bool) -> None:
+    session, dice = Session(port="test", line=LineSettings(), protocol="modbus-rtu"), Random(1)
+    remains, char = Remains(session), session.line.char
+    for no in range(many):
+        start = no * (256 + gap) * char
+        remains.add(no, Noise(dice.randbytes(256), start, start + 256 * char, Place.BETWEEN, Reason.NO_FRAME))
+    found = remains.found(of_all)
+    assert found is not None
+    assert ("longer than any frame" in found.seen) is is_told
 
 
 def _hear(line: LineFindings, *, slack: int = 0, damage: Damage | None = None, rounds: int = 30) -> Severity | None:
