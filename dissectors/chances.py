@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import erfc, exp, lgamma, log, log1p, sqrt
 
-from dissectors.busiest import Quarters, is_fault
+from dissectors.busiest import is_fault
 
 _EXACT_MOST = 400
 _NEGLIGIBLE = 1e-12
@@ -48,7 +49,7 @@ def is_by_chance(count: int, of: int, share: float, senders: int) -> bool:
     return senders * at_least(count, of, share) >= (SELDOM_ALONE if count == of else SELDOM)
 
 
-def is_rare(count: int, of: int, span: int, quarters: Quarters | None = None) -> bool:
+def is_rare(count: int, of: int, span: int, quarters: Mapping[int, int] | None = None) -> bool:
     """Whether so few in `span` ns are not worth a warning: one; or under 1 in 100 and not surely over two a minute.
 
     Of few counted ones chance makes more: up to four in one minute, eight in two, 28 in ten. `quarters`: when they

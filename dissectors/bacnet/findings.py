@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from dissectors import busiest
 from dissectors.bacnet.broken_promises import BrokenPromises
 from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.content_findings import ContentFindings
@@ -163,11 +164,14 @@ def _counted(ring: Ring) -> Iterable[Remark]:
                 node = ring.nodes.get(mac) if mac is not None else None
                 if code == "MS102" and (happened.count == 1 or _share(happened.count, node) < least_share):
                     severity = Severity.NOTE
-                if code == "MS301" and is_rare(happened.count, node.requests_received if node else 0, ring.span):
+                asked = node.requests_received if node else 0
+                if code == "MS301" and is_rare(happened.count, asked, ring.span, happened.quarters):
                     severity = Severity.NOTE
                 if code == "MS404" and happened.count == 1 and ring.header_errors + ring.data_errors + ring.cut:
                     severity = Severity.NOTE  # damage that happens to fit a header check of eight bits
                 seen = words.format(times=times(happened.count), requests=counted(happened.count, "request"))
+                if code == "MS301":
+                    seen += busiest.words(happened.quarters, happened.count, asked, ring.span)
                 # a forbidden address is the sender's affair, and may stand for no station
                 yield of(code, mac, seen, happened, severity, pair=what is not RingEventKind.ILLEGAL)
 
@@ -187,7 +191,7 @@ def _times(ring: Ring) -> Iterable[Remark]:
                 is_reply = what is RingEventKind.LATE_REPLY
                 answers = node.replies if is_reply else node.poll_replies_sent
                 unheard = is_reply and happened.count < TRUSTED * unheard_share(ring) * answers
-                rare = unheard or is_rare(happened.count, answers, ring.span)
+                rare = unheard or is_rare(happened.count, answers, ring.span, happened.quarters)
                 yield of(code, mac, seen, happened, Severity.NOTE if rare else None, pair=True)
     yield from _late_uses(ring)
 

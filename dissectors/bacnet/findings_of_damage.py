@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from math import sqrt
 
+from dissectors import busiest
 from dissectors.bacnet.findings_of_use import has_two_rhythms
 from dissectors.bacnet.ring import Ring, RingNode
 from dissectors.bacnet.ring_events import Happened, RingEventKind
@@ -30,7 +31,8 @@ AT_END_SHARE = 0.8
 def damage(ring: Ring) -> Iterable[Remark]:
     """Damaged frames: of one station where they are its own, else of the bus; noise."""
     damaged = ring.header_errors + ring.data_errors + ring.cut
-    if damaged >= DAMAGED_LEAST and damaged > DAMAGED_SHARE * ring.frames:
+    is_fault = busiest.is_fault(ring.when_damaged, ring.frames, ring.span)
+    if damaged >= DAMAGED_LEAST and (damaged > DAMAGED_SHARE * ring.frames or is_fault):
         kinds = (
             (ring.header_errors, "with a wrong header CRC"),
             (ring.data_errors, "with a wrong data CRC"),
@@ -40,7 +42,8 @@ def damage(ring: Ring) -> Iterable[Remark]:
             f"{damaged} of {counted(ring.frames, 'frame')} damaged: "
             f"{', '.join(f'{count} {what}' for count, what in kinds if count)}"
         )
-        severity = Severity.NOTE if is_rare(damaged, ring.frames, ring.span) else None
+        seen += busiest.words(ring.when_damaged, damaged, ring.frames, ring.span)
+        severity = Severity.NOTE if is_rare(damaged, ring.frames, ring.span, ring.when_damaged) else None
         yield plain("MS401", ring, None, seen, damaged, severity)
     for mac, node in ring.nodes.items():
         if node.damaged >= DAMAGED_LEAST and _is_its_own(ring, node):
@@ -90,10 +93,12 @@ def _of_one(ring: Ring, mac: int, node: RingNode) -> Iterable[Remark]:
             f"{node.cut_last} of its {sent} frames lack their last octet or two, or it is wrong; all before that fits"
         )
         yield plain("MS405", ring, mac, seen, node.cut_last)
-    if node.damaged > DAMAGED_OF_ONE_SHARE * sent and _is_there(node):
+    is_fault = busiest.is_fault(node.when_damaged, sent, ring.span)
+    if (node.damaged > DAMAGED_OF_ONE_SHARE * sent or is_fault) and _is_there(node):
         seen = f"{node.damaged} of its {sent} frames damaged"
         if replies:
             seen += f", {replies} of them answers"
+        seen += busiest.words(node.when_damaged, node.damaged, sent, ring.span)
         yield plain("MS402", ring, mac, seen, node.damaged, Severity.NOTE if _is_chance(ring, node) else None)
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+from dissectors import busiest
 from dissectors.bacnet.limits import MAX_MASTER, T_REPLY_DELAY, T_USAGE_DELAY, TURNAROUND_BITS
 from dissectors.bacnet.ring_events import EVENTS_MAX, Happened, RingEventKind
 from dissectors.histogram import Histogram
@@ -38,9 +39,9 @@ class RingNode:
     had the token. `highest_polled`: highest address that it ever polled. `polls_of_search`: polls of searches for a
     successor, its first one or one that was lost, and shortly after: they are as they should be. `polls_waited`:
     unanswered polls after which it waited as long as it must. `damaged`: damaged frames that it sent, by their header
-    or by whose turn it was; `damaged_octets` of them; `cut_last`: those where the last octet, or two, alone is missing
-    or wrong; `data_checks`, `header_checks`: how their checks are wrong. `last_token`, `last_polled`: ns, when it was
-    sent a token or a poll last.
+    or by whose turn it was; `when_damaged`: by quarters of an hour; `damaged_octets` of them; `cut_last`: those where
+    the last octet, or two, alone is missing or wrong; `data_checks`, `header_checks`: how their checks are wrong.
+    `last_token`, `last_polled`: ns, when it was sent a token or a poll last.
     """
 
     tokens_received: int = 0
@@ -75,6 +76,7 @@ class RingNode:
     poll_wait: Histogram = field(default_factory=Histogram)
     holds: Mapping[int, int] = field(default_factory=lambda: MappingProxyType({}))
     devices: tuple[int, ...] = ()
+    when_damaged: Mapping[int, int] = field(default_factory=lambda: MappingProxyType({}))
     data_checks: WrongChecks = field(default_factory=WrongChecks)
     header_checks: WrongChecks = field(default_factory=WrongChecks)
 
@@ -104,6 +106,7 @@ class RingNode:
             last_polled=max(self.last_polled, other.last_polled),
             holds=MappingProxyType(holds),
             devices=tuple(dict.fromkeys(self.devices + other.devices))[:EVENTS_MAX],
+            when_damaged=MappingProxyType(busiest.summed((self.when_damaged, other.when_damaged))),
             data_checks=self.data_checks.merge(other.data_checks),
             header_checks=self.header_checks.merge(other.header_checks),
         )
@@ -162,7 +165,8 @@ class Edge:
 class Ring:
     """What a stretch of MS/TP bus showed.
 
-    `frames`, `octets`, `noise` (octets), `header_errors`, `data_errors`, `cut`: counts.
+    `frames`, `octets`, `noise` (octets), `header_errors`, `data_errors`, `cut`: counts; `when_damaged`: those three by
+    quarters of an hour.
     `poll_waste`: time spent on polls that nobody answered, waiting included. `impossible`: frames that followed the one
     before sooner than any driver can (Tturnaround). `hole`: ns, when octets may have been missed last; `unheard`: for
     how long nobody listened in all. `polled`: when one station polled another last, ns. `happened`: events by kind and
@@ -186,6 +190,7 @@ class Ring:
     edges: Mapping[tuple[int, int], Edge] = field(default_factory=lambda: MappingProxyType({}))
     happened: Mapping[tuple[RingEventKind, int | None], Happened] = field(default_factory=lambda: MappingProxyType({}))
     polled: Mapping[tuple[int, int], int] = field(default_factory=lambda: MappingProxyType({}))
+    when_damaged: Mapping[int, int] = field(default_factory=lambda: MappingProxyType({}))
 
     @property
     def shows_tokens(self) -> bool:
@@ -312,6 +317,7 @@ class Ring:
             MappingProxyType(
                 {pair: max(one.polled.get(pair, 0) for one in (self, other)) for pair in {*self.polled, *other.polled}}
             ),
+            MappingProxyType(busiest.summed((self.when_damaged, other.when_damaged))),
         )
 
 

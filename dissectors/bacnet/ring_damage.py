@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dissectors import busiest
 from dissectors.bacnet.check_mistakes import data_ways, header_ways
 from dissectors.bacnet.frame_types import HEADER, PREAMBLE, data_length, is_encoded, total
 from dissectors.bacnet.header import is_whole_header
@@ -36,6 +37,7 @@ def count_damage(tally: RingTally, no: int, frame: Frame, speaker: Speaker | Non
         tally.data_errors += 1
     else:
         tally.cut += 1
+    busiest.count(tally.when_damaged, frame.start)
     if speaker is None:
         return
     node = tally.node(speaker.source)
@@ -43,6 +45,7 @@ def count_damage(tally: RingTally, no: int, frame: Frame, speaker: Speaker | Non
         node.first = node.first or frame.start
         node.last = frame.end
     node.damaged += 1
+    busiest.count(node.when_damaged, frame.start)
     node.damaged_octets += len(frame.octets)
     node.cut_last += only_its_end(frame, speaker)
     node.data_checks.see(no, frame.end, data_ways(frame))

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
+from dissectors.busiest import summed
+
 EVENTS_MAX = 32
 
 HASTY = 1
@@ -71,7 +73,7 @@ class Happened:
     """All events of one kind about one station: how many, when, and the first EVENTS_MAX of them.
 
     Of all, not of those that are kept: `least`, `most` of their values (no value is 0), and who the second party was
-    how often.
+    how often; `quarters`: how many came in each quarter of an hour (`dissectors.busiest`).
     """
 
     count: int = 0
@@ -81,6 +83,7 @@ class Happened:
     least: int = 0
     most: int = 0
     others: Mapping[int | None, int] = field(default_factory=dict)
+    quarters: Mapping[int, int] = field(default_factory=dict)
 
     def add(self, event: RingEvent) -> Happened:
         """One more."""
@@ -103,6 +106,7 @@ class Happened:
             min(self.least, later.least),
             max(self.most, later.most),
             others,
+            summed((self.quarters, later.quarters)),
         )
 
     def without(self, no: int, other: int | None) -> Happened:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
+from dissectors import busiest
 from dissectors.bacnet.ring import SUMS, Edge, Ring, RingNode
 from dissectors.bacnet.ring_events import Happened, RingEvent, RingEventKind
 from dissectors.bacnet.ring_window import Happening, RingJournal
@@ -34,6 +35,7 @@ class NodeTally:
     damaged: int = 0
     damaged_octets: int = 0
     cut_last: int = 0
+    when_damaged: busiest.Quarters = field(default_factory=dict)
     octets: int = 0
     held: int = 0
     highest_polled: int = -1
@@ -76,6 +78,7 @@ class NodeTally:
             poll_wait=self.poll_wait.copy(),
             holds=MappingProxyType(dict(self.holds)),
             devices=tuple(self.devices),
+            when_damaged=MappingProxyType(dict(self.when_damaged)),
             data_checks=self.data_checks.copy(),
             header_checks=self.header_checks.copy(),
         )
@@ -105,6 +108,7 @@ class RingTally:
     header_errors: int = 0
     data_errors: int = 0
     cut: int = 0
+    when_damaged: busiest.Quarters = field(default_factory=dict)
     poll_waste: int = 0
     impossible: int = 0
     hole: int = 0
@@ -112,6 +116,7 @@ class RingTally:
     nodes: dict[int, NodeTally] = field(default_factory=dict)
     edges: dict[tuple[int, int], EdgeTally] = field(default_factory=dict)
     happened: dict[tuple[RingEventKind, int | None], Happened] = field(default_factory=dict)
+    quarters: dict[tuple[RingEventKind, int | None], busiest.Quarters] = field(default_factory=dict)  # of those
     polled: dict[tuple[int, int], int] = field(default_factory=dict)
     journal: RingJournal | None = None  # where somebody asks what is new
 
@@ -141,6 +146,7 @@ class RingTally:
         """Something happened: arguments as in `RingEvent`."""
         key = (what, mac)
         self.happened[key] = self.happened.get(key, Happened()).add(RingEvent(what, time, no, mac, other, value))
+        busiest.count(self.quarters.setdefault(key, {}), time)
         if what is RingEventKind.LOST_TOKEN:
             self.enter(Happening.LOST, no, 0)
 
@@ -154,6 +160,7 @@ class RingTally:
         happened = self.happened.get((what, mac))
         if happened is not None:
             self.happened[what, mac] = happened.without(no, other)
+            busiest.take_back(self.quarters[what, mac])
 
     def value(self) -> Ring:
         """All that was counted so far."""
@@ -178,6 +185,13 @@ class RingTally:
                     for pair, one in self.edges.items()
                 }
             ),
-            MappingProxyType({key: happened for key, happened in self.happened.items() if happened.count}),
+            MappingProxyType(
+                {
+                    key: replace(happened, quarters=MappingProxyType(dict(self.quarters[key])))
+                    for key, happened in self.happened.items()
+                    if happened.count
+                }
+            ),
             MappingProxyType(dict(self.polled)),
+            MappingProxyType(dict(self.when_damaged)),
         )

@@ -11,7 +11,8 @@ ANSWER_RULES = (
         Severity.WARNING,
         "no answer",
         "A Data Expecting Reply was followed neither by data nor by Reply Postponed. A single one, or fewer than 1 "
-        "in 100 and not surely over two a minute, is only noted.",
+        "in 100 and not surely over two a minute, is only noted, where no quarter of an hour had 52, or ten and 1 in "
+        "20.",
         "the station is off, busy or at another address; or the answer was lost on the line",
         "whether it answers other requests; damaged frames at the same time",
     ),

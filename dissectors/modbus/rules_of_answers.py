@@ -31,7 +31,7 @@ ANSWER_RULES = (
         "Requests that no octet followed before the master went on, to a station that answers others; not those that "
         "were answered late, nor what stands at the border of a silence that is far longer than any wait of the master "
         "(30 times its pauses, twice the slowest answer, 3 s or more). A single one, or fewer than 1 in 100 and "
-        "not surely over two a minute, is only noted, where no quarter of an hour had ten and 1 in 20.",
+        "not surely over two a minute, is only noted, where no quarter of an hour had 52, or ten and 1 in 20.",
         "requests or answers get lost: a loose wire, a missing ground, a station too busy to answer",
         "whether requests or answers are damaged at the same times; the station's terminals and supply",
         explains=("MB104",),

@@ -41,6 +41,30 @@ def test_what_falls_anywhere_stays_rare(seed: int) -> None:
     assert busiest.words(lost.quarters, lost.count, ASKED, NIGHT) == ""
 
 
+def test_a_night_says_what_its_worst_quarter_says_alone() -> None:
+    """However much else was right: 60 of a million frames, 40 tokens of a ring a second."""
+    lost = tally([33_300 * S + 15 * S * number for number in range(60)])
+    for of in (750, 36_000, 180_000):
+        assert not is_rare(lost.count, of, busiest.QUARTER)
+        assert not is_rare(lost.count, of * 52, NIGHT, lost.quarters)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_falls_anywhere_is_no_fault_of_a_quarter(seed: int) -> None:
+    """Nearly two a minute, which is tolerable; and more, of which no quarter is told alone."""
+    dice = Random(seed)
+    steady = tally([dice.randrange(NIGHT) for _ in range(1450)])
+    assert is_rare(steady.count, 1000 * ASKED, NIGHT, steady.quarters)
+    many = tally([dice.randrange(NIGHT) for _ in range(20_000)])
+    assert busiest.words(many.quarters, many.count, 1000 * ASKED, NIGHT) == ""
+
+
+def test_what_was_none_is_taken_from_the_newest_quarter() -> None:
+    noted = tally([0, 1000 * S, 1001 * S])
+    busiest.take_back(noted.quarters)
+    assert noted.quarters == tally([0, 1000 * S]).quarters
+
+
 def test_a_burst_of_two_seconds_is_no_fault_of_a_quarter() -> None:
     burst = tally([33_000 * S + S // 10 * number for number in range(20)])
     assert is_rare(burst.count, ASKED, NIGHT, burst.quarters)

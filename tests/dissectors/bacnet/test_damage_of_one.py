@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from random import Random
 
 import pytest
 
 from dissectors.bacnet.findings import judge
 from dissectors.bacnet.ring import Ring, RingNode
+from dissectors.bacnet.ring_events import Happened, RingEventKind
 from dissectors.bacnet.rules import RULES
 from dissectors.findings import Severity, with_consequences
+from dissectors.line import Timing
+from tests.dissectors.bacnet.ring_script import rounds, script, spoil, token
 
 SENT = 40
 
@@ -57,3 +61,31 @@ def test_what_falls_anywhere_names_hardly_ever_a_station(strikes: int, of: int) 
             damaged[dice.randrange(of)] += 1
         wrong += graves(told(*damaged)) != {"bus"}
     assert wrong <= 5
+
+
+@pytest.mark.parametrize(("quarters", "named"), [({7: 60}, {"MAC 1"}), (dict.fromkeys(range(30), 2), set())])
+def test_a_night_names_who_was_bad_for_a_quarter_of_an_hour(quarters: dict[int, int], named: set[str]) -> None:
+    """60 of a million frames: pooled over the night they are nothing."""
+    sent, night = 1_000_000, 13 * 3600 * 10**9
+    one, happened = RingNode(data_sent=sent, tokens_received=sent, requests_received=sent, octets=8 * sent), {}
+    nodes = {1: replace(one, damaged=60, damaged_octets=480, when_damaged=quarters), 2: one}
+    found = with_consequences(
+        judge(Ring(Timing(), 0, night, 2 * sent, data_errors=60, nodes=nodes, when_damaged=quarters)), RULES
+    )
+    assert graves({each.subject: each.severity for each in found}) == named
+    happened[RingEventKind.NO_REPLY, 2] = Happened(60, 0, night, others={1: 60}, quarters=quarters)
+    found = with_consequences(
+        judge(Ring(Timing(), 0, night, 2 * sent, nodes={1: one, 2: one}, happened=happened)), RULES
+    )
+    assert {each.code for each in found if each.severity >= Severity.WARNING} == ({"MS301"} if named else set())
+
+
+def test_damage_is_counted_by_quarters_as_it_is_counted() -> None:
+    ring = script([*rounds(4, 1, 5), *[(2, spoil(token(1, 5), 4)), (2, token(5, 1))] * 5]).ring
+    assert sum(ring.when_damaged.values()) == ring.header_errors + ring.data_errors + ring.cut > 0
+    for node in ring.nodes.values():
+        assert sum(node.when_damaged.values()) == node.damaged
+    for happened in ring.happened.values():
+        assert sum(happened.quarters.values()) == happened.count
+    doubled = ring.merge(ring)
+    assert sum(doubled.when_damaged.values()) == 2 * sum(ring.when_damaged.values())
