@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 from dissectors import registry
@@ -39,6 +40,13 @@ def test_every_table_and_key_of_the_configuration_is_explained() -> None:
         assert re.search(rf"\[{table}[].]", text), table
         for key in keys:
             assert f"`{key}`" in text or re.search(rf"^{key} = |`{key} = ", text, re.M), f"{table}: {key}"
+
+
+def test_every_extra_is_explained() -> None:
+    told = tomllib.loads((PAGES.parents[1] / "pyproject.toml").read_text("utf-8"))
+    text = (PAGES / "install.md").read_text("utf-8")
+    extras = set(told["project"]["optional-dependencies"]) - {"docs", "test"}  # for developers
+    assert {name for name in extras if not re.search(rf"^\| [^|]*`{name}`[^|]* \|", text, re.M)} == set()
 
 
 def test_keys_that_are_named_are_there() -> None:
