@@ -13,7 +13,7 @@ that several fit.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
 
 from dissectors.line import LineSettings
@@ -48,21 +48,28 @@ def _fits(burst: bytes, factor: int, line: LineSettings) -> bool:
     """Whether whole characters with silence behind them are heard as these octets."""
     ways: set[tuple[int, _Partial]] = {(0, ())}
     while ways and len(ways) <= _MOST_WAYS:
-        following: set[tuple[int, _Partial]] = set()
-        for at, partial in ways:
-            table = _table(factor, line, partial)
-            for heard, then in (*table.get(burst[at], ()), *table.get(-1, ())):
-                place = at + len(heard)
-                if burst[at:place] != heard:
-                    continue
-                if place == len(burst) and not then:
-                    return True
-                if place < len(burst):
-                    if place + 1 == len(burst) and then and _value([*then, *[1] * line.data_bits], line) == burst[-1]:
-                        return True
-                    following.add((place, then))
-        ways = following
+        reached = {way for at, partial in ways for way in _with_one_more(burst, at, partial, factor, line)}
+        if any(_is_end(burst, at, partial, line) for at, partial in reached):
+            return True
+        ways = {(at, partial) for at, partial in reached if at < len(burst)}
     return False
+
+
+def _with_one_more(
+    burst: bytes, at: int, partial: _Partial, factor: int, line: LineSettings
+) -> Iterator[tuple[int, _Partial]]:
+    """How far the burst is heard with each character that fits there, and what is begun then."""
+    table = _table(factor, line, partial)
+    for heard, then in (*table.get(burst[at], ()), *table.get(-1, ())):
+        if burst.startswith(heard, at):
+            yield at + len(heard), then
+
+
+def _is_end(burst: bytes, at: int, partial: _Partial, line: LineSettings) -> bool:
+    """Whether silence from here on leaves nothing over."""
+    if not partial:
+        return at == len(burst)
+    return at + 1 == len(burst) and _value([*partial, *[1] * line.data_bits], line) == burst[-1]
 
 
 @lru_cache(maxsize=4096)
