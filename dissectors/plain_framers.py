@@ -92,6 +92,13 @@ class PlainFramer:
         """Give all that is decided; with `last`, nothing more can come and all is given."""
         raise NotImplementedError
 
+    def _noise_ahead(self, form: Delimited | Lengthy, last: bool) -> Noise | None:
+        """What stands ahead of the next start; None where it is held until something ends it, so that cuts of reads do
+        not show."""
+        begin = self._window.octets.find(form.start)
+        count = min(begin if begin > 0 else len(self._window.octets), form.longest)
+        return None if begin < 0 and count < form.longest and not last else self._noise(count)
+
     def _noise(self, count: int, reason: Reason = Reason.NO_DELIMITER) -> Noise:
         taken = self._window.take(count)
         self._skipped += count
@@ -126,12 +133,10 @@ class DelimitedFramer(PlainFramer):
         events: list[Event] = []
         octets, form = self._window.octets, self._form
         while octets:
-            begin = octets.find(form.start)
-            if begin:  # noise is held until something ends it, so that cuts of reads do not show
-                count = min(begin if begin > 0 else len(octets), form.longest)
-                if begin < 0 and count < form.longest and not last:
+            if not octets.startswith(form.start):
+                if (noise := self._noise_ahead(form, last)) is None:
                     break
-                events.append(self._noise(count))
+                events.append(noise)
                 continue
             end, again = octets.find(form.end, 1, form.longest), octets.find(form.start, 1, form.longest)
             if again > 0 and not 0 < end < again:
@@ -163,12 +168,10 @@ class LengthFramer(PlainFramer):
         events: list[Event] = []
         octets, form = self._window.octets, self._form
         while octets:
-            begin = octets.find(form.start)
-            if begin:
-                count = min(begin if begin > 0 else len(octets), form.longest)
-                if begin < 0 and count < form.longest and not last:
+            if not octets.startswith(form.start):
+                if (noise := self._noise_ahead(form, last)) is None:
                     break
-                events.append(self._noise(count))
+                events.append(noise)
                 continue
             length = self._length(0)
             if length is None:  # the header is not complete
