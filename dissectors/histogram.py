@@ -31,14 +31,18 @@ class Histogram:
 
     def add(self, value: int) -> None:
         """Count one value; negative ones count as 0."""
-        value = max(0, value)
+        if value < 0:
+            value = 0
         bucket = _bucket(value)
         self.buckets[bucket] += 1
-        self.tops[bucket] = max(value, self.tops.get(bucket, 0))
+        if value > self.tops.get(bucket, -1):
+            self.tops[bucket] = value
         self.count += 1
         self.total += value
-        self.least = value if self.least is None else min(self.least, value)
-        self.most = value if self.most is None else max(self.most, value)
+        if self.least is None or value < self.least:
+            self.least = value
+        if self.most is None or value > self.most:
+            self.most = value
 
     def add_many(self, values: npt.NDArray[np.int64]) -> None:
         """Count many values; the same as one after the other."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 from dissectors.quick_values import quickly_made
@@ -23,12 +23,17 @@ class LineSettings:
     """Baud rate and character format of a line.
 
     `baud`: bit/s, SLOWEST … FASTEST. `data_bits` 5 … 8. `parity` one of N E O M S. `stop_bits` 1, 1.5 or 2.
+    `char`: time of one character, ns, rounded down; it follows from the others and is asked for with every frame.
     """
 
     baud: int = 9600
     data_bits: int = 8
     parity: str = "N"
     stop_bits: float = 1
+    char: int = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "char", _char(self.baud, self.data_bits, self.parity, self.stop_bits))
 
     @classmethod
     def parse(cls, token: str) -> LineSettings:
@@ -56,11 +61,6 @@ class LineSettings:
         """Bits on the wire for one character: start, data, parity, stop."""
         return _bits(self.data_bits, self.parity, self.stop_bits)
 
-    @property
-    def char(self) -> int:
-        """Time of one character, ns, rounded down."""
-        return _char(self.baud, self.data_bits, self.parity, self.stop_bits)
-
     def bits(self, count: float) -> int:
         """Time of `count` bits, ns."""
         return int(count * NS_PER_S // self.baud)
@@ -70,7 +70,7 @@ def _bits(data: int, parity: str, stop: float) -> float:
     return 1 + data + (parity != "N") + stop
 
 
-@lru_cache(256)  # asked for with nearly every frame
+@lru_cache(256)  # lines are made again and again
 def _char(baud: int, data: int, parity: str, stop: float) -> int:
     return int(_bits(data, parity, stop) * NS_PER_S // baud)
 
