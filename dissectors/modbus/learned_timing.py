@@ -7,7 +7,7 @@ a bus that changes is learnt anew. All times are int ns, as they were measured (
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
 from dissectors.line import Timing
@@ -77,8 +77,12 @@ class LearnedTiming:
         """
         if elapsed < self._latency:
             return
-        cycle = self._slowest() + self._answer + max(self._pauses, default=0) * 11 // 10
-        if elapsed <= (self._slowest() if repeated or not self._pauses else cycle):
+        if repeated or not self._pauses:
+            enough: int | None = self._slowest()
+        else:
+            pause = self._pause_within(elapsed, self._pauses)
+            enough = None if pause is None else self._slowest() + self._answer + pause * 11 // 10
+        if enough is None or elapsed <= enough:
             return
         self._unanswered.append(elapsed)
         self._timeout = self._agreed()
@@ -110,19 +114,25 @@ class LearnedTiming:
             return False  # it pauses as it likes
         return abs(pause - gap) <= self._margin or (pause >= gap and self._is_pause(pause - gap))
 
-    def turn(self, unit: int, answer: int) -> tuple[int, int] | None:
+    def turn(self, unit: int, answer: int, gap: int) -> tuple[int, int] | None:
         """From the end of a request to the next, where an answer of `answer` ns comes: at least, and at most as a rule.
 
         None while unlearnt. A unit that takes longer than most is held to what most take: a wait for it may be in vain.
+        `gap`: what is compared with it; where the master pauses long between rounds and shortly within them, it is held
+        to those pauses that it may contain.
         """
         if len(self._pauses) < _USUAL_PAUSES or not self._times:
             return None
         usual = {key: sorted(times)[len(times) // 2] for key, times in self._times.items()}
         everybody = sorted(usual.values())[(len(usual) - 1) // 2]
         response = min(usual.get((unit, READ), everybody), everybody)
-        pauses = sorted(self._pauses)
-        pause = pauses[3 * len(pauses) // 4]
+        usual_pauses = sorted(self._pauses)[: 3 * len(self._pauses) // 4 + 1]
+        pause = self._pause_within(gap, usual_pauses) or usual_pauses[0]
         return response // 2 + answer, (response + pause) * 5 // 4 + answer + self._margin
+
+    def _pause_within(self, gap: int, pauses: Iterable[int]) -> int | None:
+        """The longest of some pauses that fits into a gap; None where all are longer."""
+        return max((pause for pause in pauses if pause - pause // 10 <= gap + self._margin), default=None)
 
     def _sends_by_the_clock(self, cycle: int) -> bool:
         return len(self._pauses) < 2 or any(self.is_same(cycle, one) for one in self._cycles)
@@ -153,6 +163,10 @@ class LearnedTiming:
     def knows(self, unit: int) -> bool:
         """Whether the unit has answered anything whose direction is sure."""
         return any(one == unit for one, _ in self._times)
+
+    def may_hide_a_wait(self, gap: int) -> bool:
+        """Whether the master may have waited in vain within a gap: before a pause between rounds, nothing tells."""
+        return self._timeout is not None and gap >= self._timeout
 
     def is_timeout(self, gap: int) -> bool:
         """Whether that long is how long the master waits before it repeats."""

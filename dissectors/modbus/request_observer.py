@@ -194,5 +194,8 @@ class RequestObserver(RowObserver):
 
     def _is_within_a_turn(self, transaction: Transaction, asked: AskedRequest) -> bool:
         """Whether an answer came too soon for another request to have been asked and answered since."""
-        turn = self.learnt.turn(asked.unit, asked.answer_time(self.timing.char))
-        return turn is not None and transaction.latency is not None and transaction.latency.nominal <= turn[1]
+        if transaction.latency is None:
+            return False
+        took = transaction.latency.nominal
+        turn = self.learnt.turn(asked.unit, asked.answer_time(self.timing.char), took)
+        return turn is not None and took <= turn[1]

@@ -160,10 +160,13 @@ class RowObserver(Remembered):
         if before.header.role is not Role.REQUEST:  # a write has the shape of its answer, which may have come late
             return
         self.learnt.unanswered(gap)
-        turn = self.learnt.turn(before.unit, before.answer_time(self.timing.char))
-        if turn is not None:
-            kind = self.hasty if gap < turn[0] else self.unheard if gap <= turn[1] else self.waited_for
-            kind.append(before.no)
+        turn = self.learnt.turn(before.unit, before.answer_time(self.timing.char), gap)
+        if turn is not None and gap < turn[0]:
+            self.hasty.append(before.no)
+        elif turn is not None and gap > turn[1]:
+            self.waited_for.append(before.no)
+        elif turn is not None and not self.learnt.may_hide_a_wait(gap):
+            self.unheard.append(before.no)
         late = () if asked.header.role is Role.REQUEST else ((asked.in_list, before.in_list),)
         self.waits[before.no] = gap, asked.no, ((before.in_list, asked.in_list), *late)
         if len(self.waits) > LOST_KEPT:

@@ -131,10 +131,30 @@ def test_a_frame_long_before_the_usual_pause_is_no_request() -> None:
 
 def test_a_turn_is_at_least_half_an_answer_and_at_most_one_and_a_pause() -> None:
     made = learnt(reads=[20] * 4, pauses=[8, 10, 12])
-    assert made.turn(1, 5 * MS) == (15 * MS, (20 + 12) * MS * 5 // 4 + 5 * MS + made.margin)
-    assert learnt(reads=[20], pauses=[8, 10]).turn(1, 0) is None
-    assert learnt(pauses=[8, 10, 12]).turn(1, 0) is None
+    assert made.turn(1, 5 * MS, 900 * MS) == (15 * MS, (20 + 12) * MS * 5 // 4 + 5 * MS + made.margin)
+    assert learnt(reads=[20], pauses=[8, 10]).turn(1, 0, 0) is None
+    assert learnt(pauses=[8, 10, 12]).turn(1, 0, 0) is None
     for time in (30, 30, 60):
         made.answered(2, READ, time * MS)
         made.answered(3, READ, 90 * MS)
-    assert made.turn(3, 0) == made.turn(2, 0)  # who takes longer than most is held to what most take
+    assert made.turn(3, 0, 50 * MS) == made.turn(2, 0, 50 * MS)  # who takes longer than most is held to what most take
+
+
+def test_a_gap_is_held_to_the_pauses_that_fit_into_it():
+    """A master that asks in rounds: 10 ms from one station to the next, five seconds from round to round."""
+    made = learnt(reads=[20, 20], pauses=[10, 10, 5000] * 4)
+    assert made.turn(1, 0, 200 * MS)[1] < 200 * MS
+    assert made.turn(1, 0, 5000 * MS)[1] > 5000 * MS
+    made.unanswered(1000 * MS)
+    made.unanswered(1000 * MS)
+    assert made.timeout == 1000 * MS
+    assert made.may_hide_a_wait(5000 * MS)
+    assert not made.may_hide_a_wait(50 * MS)
+
+
+def test_what_an_answer_and_a_pause_may_take_is_no_wait_of_the_master():
+    made = learnt(reads=[20, 20], pauses=[10, 20, 30, 40])
+    for gap in (5, 40, 60):  # less than any pause; an answer and a pause
+        made.unanswered(gap * MS)
+        made.unanswered(gap * MS)
+    assert made.timeout is None

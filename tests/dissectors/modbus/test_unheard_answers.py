@@ -103,3 +103,20 @@ def test_a_master_by_the_clock_goes_on_as_after_an_answer_where_there_is_none(pa
                 left -= took + LASTS
             pause = left
     assert graves_of(bus) >= ({("MB001", "station 2")} if by_the_clock else {("MB020", "bus")})
+
+
+@pytest.mark.parametrize("latency", [0, 16_000_000], ids=["exact", "ftdi"])
+@pytest.mark.parametrize("wait", [150, 300, 1000])
+@pytest.mark.parametrize("absent", UNITS)
+def test_a_master_that_asks_in_rounds_waits_for_an_absent_station(paper_bus, latency, wait, absent):
+    """Every five seconds it asks each once: the pause between rounds is no pause after an answer within one."""
+    bus, pause, round_ = paper_bus(latency=latency), PAUSE, 0.0
+    for turn in range(20):
+        for unit in UNITS:
+            bus.say(read(unit), pause)
+            if unit != absent:
+                bus.say(values(unit, turn), ANSWER)
+            pause = PAUSE if unit != absent else float(wait)
+            round_ += pause
+        pause, round_ = pause + 5000.0 - round_, 0.0
+    assert graves_of(bus) == {("MB001", f"station {absent}")}
