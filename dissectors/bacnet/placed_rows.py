@@ -12,7 +12,7 @@ import numpy as np
 
 from dissectors.bacnet.data_exchanges import LATE_WITHIN
 from dissectors.bacnet.frame_types import HEADER, FrameType
-from dissectors.bacnet.limits import BROADCAST, T_NO_TOKEN, T_USAGE_DELAY, TURNAROUND_BITS
+from dissectors.bacnet.limits import BROADCAST, T_NO_TOKEN, T_USAGE_DELAY, T_USAGE_TIMEOUT, TURNAROUND_BITS
 from dissectors.bacnet.npdu_columns import heads
 from dissectors.bacnet.open_exchanges import REMEMBERED
 from dissectors.bacnet.past_exchanges import NO_KEY
@@ -97,6 +97,7 @@ class PlacedRows:
         same &= (self.source == self.source[before]) & (self.destination == self.destination[before])
         if self._timing.latency < T_USAGE_DELAY:
             doubtful |= same & (gap < self._timing.line.bits(TURNAROUND_BITS))
+        doubtful |= same & ((classes == TOKEN) | (classes == POLL)) & (gap < T_USAGE_TIMEOUT)  # perhaps a copy
         doubtful |= classes == DOUBTFUL
         self.answered, self._in_time = answered, in_time
         self._used = in_time & (self.source == self.destination[before])

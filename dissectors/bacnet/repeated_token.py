@@ -14,6 +14,13 @@ from dissectors.frame import Frame
 _TOKEN = int(FrameType.TOKEN)
 
 
+def is_too_soon(gap: int, slack: int, turnaround: int) -> bool:
+    """Whether a token, or a poll, `gap` ns (up to `slack` more) behind the same one is a copy: who repeats its own
+    waits for Tusage_timeout. Half of it is granted to programs that do not; not where it may have come directly
+    behind."""
+    return gap + slack < T_USAGE_TIMEOUT // 2 or (gap < turnaround and gap + slack < T_USAGE_TIMEOUT)
+
+
 class RepeatedToken:
     """Follows the newest repeated token. `of`: who was sent it, None where there is none to follow. Times in ns."""
 

@@ -13,7 +13,7 @@ from dissectors.bacnet.frame_types import EXPECTING, HEADER, FrameType
 from dissectors.bacnet.held_reads import UNNAMED_TICK, HeldReads
 from dissectors.bacnet.limits import BROADCAST, MAX_MASTER, T_NO_TOKEN, T_USAGE_DELAY, T_USAGE_TIMEOUT, TURNAROUND_BITS
 from dissectors.bacnet.lost_tokens import longest_wait, makes_token
-from dissectors.bacnet.repeated_token import RepeatedToken
+from dissectors.bacnet.repeated_token import RepeatedToken, is_too_soon
 from dissectors.bacnet.ring_events import RingEvent, RingEventKind
 from dissectors.bacnet.ring_questions import (
     T_LATE_ANSWER,
@@ -45,7 +45,8 @@ class TokenWatch:
 
     def __init__(self, timing: Timing) -> None:
         self._tally = RingTally(timing)
-        self._least_gap = timing.line.bits(TURNAROUND_BITS) // 2
+        self._turnaround = timing.line.bits(TURNAROUND_BITS)
+        self._least_gap = self._turnaround // 2
         self._holder: int | None = None  # None: not known
         self._passed_by: int | None = None  # who passed the token to the holder, while the holder has not used it
         self._token: Frame | None = None  # that token, while unused
@@ -305,7 +306,7 @@ class TokenWatch:
             and source != destination  # who passes the token to itself uses it by doing so again
             and not self._doubt
             and before.octets[:HEADER] == frame.octets[:HEADER]
-            and self._gap(frame) + before.slack >= T_USAGE_TIMEOUT // 2
+            and not is_too_soon(self._gap(frame), before.slack, self._turnaround)
         )
         if again and before is not None:
             self._repeated.repeat(destination, before.end)

@@ -32,6 +32,7 @@ from dissectors.bacnet.frame_types import EXPECTING, FrameType, total
 from dissectors.bacnet.header import is_whole_header
 from dissectors.bacnet.limits import MAX_ENCODED, T_REPLY_DELAY, T_USAGE_DELAY, TURNAROUND_BITS
 from dissectors.bacnet.reassembly import Reassembler
+from dissectors.bacnet.repeated_token import is_too_soon
 from dissectors.bacnet.turn import Turn
 from dissectors.frame import Event, Frame, Header, Noise, Role
 from dissectors.line import Timing
@@ -270,12 +271,17 @@ class MstpTracker(DataExchanges):
         return self._at(no, waiting.id, header, Role.RESPONSE)
 
     def _is_echo(self, frame: Frame) -> bool:
-        """An exact copy sooner than any node may send; not to be told where the adapter hides such times."""
-        if self._previous is None or self._latency >= T_USAGE_DELAY:
+        """An exact copy sooner than any node may send it, by the largest reading of the time: a token or a poll is only
+        repeated after a wait; anything else may be sent twice in a row, where the adapter does not hide such times."""
+        if self._previous is None:
             return False
         before = self._previous[0]
-        gap = frame.start - before.end + before.slack  # by its largest reading
-        return frame.ok and before.octets == frame.octets and gap < self._turnaround and before.end < frame.end
+        if not frame.ok or before.octets != frame.octets or before.end >= frame.end:
+            return False
+        gap = frame.start - before.end
+        if frame.octets[2] in (FrameType.TOKEN, FrameType.POLL_FOR_MASTER) and frame.octets[3] != frame.octets[4]:
+            return is_too_soon(gap, before.slack, self._turnaround)
+        return self._latency < T_USAGE_DELAY and gap + before.slack < self._turnaround
 
     def _echo(self, no: int, frame: Frame, header: Header, closed: list[Transaction]) -> Placement:
         of = self._previous[1] if self._previous is not None else None

@@ -215,7 +215,7 @@ _ALL = (
         "with nearly every one: a warning from three on, and half of the requests.",
         "a repeater or converter that gives back what it hears, or an adapter that hears itself",
         "the echo setting of the master's adapter or of the converter; it halves the time left on the bus",
-        explains=("N2011", "N2013", "PB018", "LN204"),
+        explains=("N2011", "N2013", "MS102", "PB018", "LN204"),
     ),
     Rule(
         "LN206",

@@ -110,7 +110,7 @@ TOKENS = [(5, frame(0, 2, 1)), (5, frame(0, 1, 2))] * 3
 
 @pytest.mark.parametrize("seconds", [50, 59, 60, 61, 70])
 def test_a_request_is_tried_again_within_a_minute(seconds: int) -> None:
-    tried = [*TOKENS, (5, _request(1)), (400, frame(0, 2, 1)), *TOKENS]
+    tried = [*TOKENS, (5, _request(1)), (400, frame(0, 1, 2)), *TOKENS]
     chunks = _bus(*tried, (1000 * seconds - 480, _request(1)), (30, _answer(1, b"\x30")), *TOKENS)
     by_columns, total = assert_paired_alike(chunks, Timing(buses.LINE))
     assert by_columns > total - 4

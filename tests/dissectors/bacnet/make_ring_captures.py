@@ -332,6 +332,15 @@ def two_ways_to_one_network() -> list[Step]:
     return [*once, (2, token(6, 20)), (2, token(20, 4))] * 3 + rounds(3, 4, 6, 20)
 
 
+def each_frame_twice() -> list[Step]:
+    """A converter gives back what it hears, behind an adapter that hides how soon; now and then in the next read."""
+    steps: list[Step] = []
+    asked: list[Step] = [(2, data(3, 12, READ, expects=True)), (6, data(12, 3, VALUE))]
+    for at, (silence, octets) in enumerate([*rounds(12, 3, 12, 19), *asked, *rounds(4, 3, 12, 19)]):
+        steps += [(silence, octets), (14 if at % 9 == 8 else 0, octets)]
+    return steps
+
+
 def two_routers_and_numbers() -> list[Step]:
     """4 and 6 both pass on what comes from network 2001, broadcasts too, and say that this network is 5 and 9."""
     steps: list[Step] = []
@@ -413,6 +422,7 @@ MADE = {
     "ms-tp-polls-beyond-its-successor": polls_astray,
     "ms-tp-two-routers-to-one-network": two_ways_to_one_network,
     "ms-tp-token-to-itself-behind-an-adapter": token_to_itself,
+    "ms-tp-each-frame-twice-behind-an-adapter": each_frame_twice,
     "ms-tp-two-routers-pass-on-from-one-network": two_routers_and_numbers,
     "ms-tp-answers-to-another-address": answers_elsewhere,
     "ms-tp-answers-with-another-number": answers_with_another_number,
@@ -420,7 +430,7 @@ MADE = {
 }
 
 
-LATENCY = {"ms-tp-lost-token-behind-an-adapter": 17.5, "ms-tp-token-to-itself-behind-an-adapter": 17.5}
+LATENCY = dict.fromkeys((name for name in MADE if name.endswith("behind-an-adapter")), 17.5)
 """ms, of captures that come through an adapter that holds reads back."""
 
 

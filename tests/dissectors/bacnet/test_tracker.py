@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -206,6 +207,16 @@ def test_an_echo_is_told_only_where_times_are_fine():
     assert [t.verdict for t in run.closed] == [Verdict.ECHO, Verdict.ANSWERED]
     assert run.closed[0].of == run.closed[1].id
     run = track((10, request()), (0.1, request()), (20, answer()), timing=Timing(LINE, 17 * MS))
+    assert run.of(Verdict.ECHO) == []
+
+
+@pytest.mark.parametrize("latency", [0, 1, 17])
+def test_a_token_that_comes_again_sooner_than_it_may_is_a_copy(latency: int):
+    """0.1 ms, behind an adapter in the same read: nobody repeats a token so soon. 24 ms: it is repeated."""
+    soon = 0 if latency > 15 else 0.1
+    run = track((10, TOKEN_25), (soon, TOKEN_25), (2, request()), (20, answer()), timing=Timing(LINE, latency * MS))
+    assert len(run.of(Verdict.ECHO)) == 1
+    run = track((10, TOKEN_25), (24, TOKEN_25), (2, request()), (20, answer()), timing=Timing(LINE, latency * MS))
     assert run.of(Verdict.ECHO) == []
 
 
