@@ -29,6 +29,7 @@ from dissectors.bacnet.ring_events import Happened, RingEventKind
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.bacnet.ring_window import MstpRingWindow
 from dissectors.bacnet.rules import RULES
+from dissectors.bacnet.told_silent import ToldSilent
 from dissectors.bacnet.unheard import TRUSTED
 from dissectors.chances import is_rare
 from dissectors.findings import Finding, Severity, as_consequence, counted, times
@@ -268,6 +269,7 @@ class MstpFindings:
         self._content = ContentFindings()
         self._instances, self._routers, self._lengths = DeviceInstances(), RouterFindings(), LongAnswers()
         self._refusals, self._promises, self._numbers = Refusals(), BrokenPromises(), OtherNumbers()
+        self._silent = ToldSilent()
         self._newest: tuple[tuple[int, Event | None], ...] = ()  # the newest two rows, their numbers before them
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None = None) -> None:
@@ -277,6 +279,7 @@ class MstpFindings:
         self._instances.see(no, event, header)
         self._routers.see(no, event, header)
         self._lengths.see(no, event, header)
+        self._silent.see(no, event, header)
         self._newest = (*self._newest[-1:], (no, event))
 
     def settle(self, transaction: Transaction) -> None:
@@ -306,6 +309,7 @@ class MstpFindings:
         self._instances.take(rows)
         self._routers.take(rows)
         self._lengths.take(rows)
+        self._silent.take(rows)
         self._settle_many(rows)
 
     def _settle_many(self, rows: RowColumns) -> None:
@@ -364,5 +368,5 @@ class MstpFindings:
         others = (*self._refusals.findings(), *self._content.findings(), *self._instances.findings(ring.nodes))
         others += (*self._routers.findings(), *self._promises.findings(ring), *self._lengths.findings())
         others += tuple(self._numbers.findings(ring))
-        made = (*judge(ring), *others)
+        made = (*self._silent.told(judge(ring)), *others)
         return tuple(sorted(made, key=_gravest_first))

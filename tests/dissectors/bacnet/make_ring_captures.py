@@ -332,6 +332,21 @@ def two_ways_to_one_network() -> list[Step]:
     return [*once, (2, token(6, 20)), (2, token(20, 4))] * 3 + rounds(3, 4, 6, 20)
 
 
+def ordered_to_be_silent(order: str = "1901", *, refused: bool = False) -> list[Step]:
+    """3 tells 12 by DeviceCommunicationControl to be silent, which it is from then on."""
+    answer = "01005001119104911a" if refused else "0100200111"
+    steps = [
+        *rounds(4, 3, 12, 19),
+        (2.0, data(3, 12, f"010400030111{order}", expects=True)),
+        (5.0, data(12, 3, answer)),
+    ]
+    for at in range(5):
+        ask = f"{READ[:8]}{at + 20:02x}{READ[10:]}"
+        steps += [*rounds(1, 3, 12, 19), (2, data(3, 12, ask, expects=True)), (260, token(3, 12))]
+        steps += [(2, token(12, 19)), (2, token(19, 3))]
+    return steps
+
+
 def each_frame_twice() -> list[Step]:
     """A converter gives back what it hears, behind an adapter that hides how soon; now and then in the next read."""
     steps: list[Step] = []
@@ -422,6 +437,7 @@ MADE = {
     "ms-tp-polls-beyond-its-successor": polls_astray,
     "ms-tp-two-routers-to-one-network": two_ways_to_one_network,
     "ms-tp-token-to-itself-behind-an-adapter": token_to_itself,
+    "ms-tp-ordered-to-be-silent": ordered_to_be_silent,
     "ms-tp-each-frame-twice-behind-an-adapter": each_frame_twice,
     "ms-tp-two-routers-pass-on-from-one-network": two_routers_and_numbers,
     "ms-tp-answers-to-another-address": answers_elsewhere,
