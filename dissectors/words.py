@@ -34,10 +34,10 @@ def duration(value: int) -> str:
     return f"{_three_digits(seconds)} s" if value < _MINUTES_FROM else f"{_three_digits(seconds / 60)} min"
 
 
-def elapsed(value: int) -> str:
+def elapsed(value: int, places: int = 1) -> str:
     """A time since a begin, ns, by which a moment is found: "123.4 s", from five minutes on "9 h 10 min 5 s"."""
     if value < _MINUTES_FROM:
-        return f"{value / NS_PER_S:.1f} s"
+        return f"{value / NS_PER_S:.{places}f} s"
     minutes, seconds = divmod(round(value / NS_PER_S), 60)
     hours, minutes = divmod(minutes, 60)
     parts = ((hours, "h"), (minutes, "min"), (seconds, "s"))

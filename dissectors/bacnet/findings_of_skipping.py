@@ -43,7 +43,7 @@ def _shut_out(ring: Ring, mac: int, node: RingNode, by: int, following: int, rou
     polled = sorted(
         address for (source, address), time in ring.polled.items() if source == by and time > node.last_token
     )
-    first = "" if ring.first is None else f" {elapsed(node.last_token - ring.first)} into the capture"
+    first = "" if ring.first is None else f" {elapsed(node.last_token - ring.first, 2)} into the capture"
     seen = (
         f"got its last token{first}; since then {rounds} rounds without a token or a poll for it: "
         f"MAC {by} passes the token on to MAC {following} and polls "
