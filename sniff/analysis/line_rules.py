@@ -295,7 +295,8 @@ _ALL = (
         "several stations lost at one moment",
         "Two stations or more that had answered, and then left three requests in a row without answer, all from the "
         "same moment on as far as their polls tell, within so small a part of the capture that chance would put so "
-        "many there less than once in ten. A warning where they came back, unless it was so three times and more.",
+        "many there less than once in ten; or that answered nothing at first, for ten seconds, and then all from one "
+        "such moment on. A warning where they came back, unless it was so three times and more.",
         "something they share: a supply, a fuse, a stretch of cable, a repeater",
         "what these stations have in common: supply, cabinet, the piece of cable behind the last one that answers",
         explains=(

@@ -24,6 +24,9 @@ MOMENT = 30 * NS_PER_S
 """From the first of their last answers to the last of the first misses; over longer, a hole, nobody saw what stopped
 when."""
 
+ABSENT_LEAST = 10 * NS_PER_S
+"""For so long none of a station's first requests was answered; sooner it may just have been started."""
+
 BY_CHANCE = 0.1
 """Chance below which losses in one part of a capture are no chance: each falls anywhere in it."""
 
@@ -50,13 +53,14 @@ class _Loss:
 
 @dataclass(slots=True)
 class _Station:
-    """How a station answers. `gone`: between which moments it stopped, while it does not answer."""
+    """How a station answers. `came`: when it answered first, ns, where it had left all before without answer."""
 
     answered: int = 0
     last_answer: int = 0
     missed: int = 0
     first_missed: int = 0
     rows: list[int] = field(default_factory=list)
+    came: int | None = None
     losses: deque[tuple[int, int, int]] = field(
         default_factory=lambda: deque(maxlen=LOSSES_KEPT)
     )  # last answer, miss, back (0)
@@ -129,6 +133,8 @@ class LostTogether:
     def _back(self, station: _Station, time: int) -> None:
         if station.missed >= LOST_IN_A_ROW and station.answered >= ANSWERED_BEFORE:
             station.losses.append((station.last_answer, station.first_missed, time))
+        elif station.missed >= LOST_IN_A_ROW and not station.answered and time - station.first_missed >= ABSENT_LEAST:
+            station.came = time
         station.missed = 0
 
     def findings(self, first: int, now: int) -> Iterator[Finding]:
@@ -138,6 +144,27 @@ class LostTogether:
             by_names.setdefault(tuple(names), []).append(_Loss(together, moment))
         for stations, losses in by_names.items():
             yield self._lost(losses[0], stations, first) if len(losses) == 1 else self._often(losses, stations, first)
+
+        yield from self._came(first, now)
+
+    def _came(self, first: int, now: int) -> Iterator[Finding]:
+        """Stations that answered nothing at first, and all from one moment on."""
+        came = sorted((one.came, number) for number, one in self._stations.items() if one.came is not None)
+        while came and self._has_times:
+            begin = came[0][0]
+            together = [one for one in came if one[0] - begin <= MOMENT]
+            came = came[len(together) :]
+            window, names = together[-1][0] - begin, tuple(sorted(number for _, number in together))
+            if len(names) < 2 or window >= now - first or (window / (now - first)) ** (len(names) - 1) > BY_CHANCE:
+                continue
+            tally = Tally()
+            for number in names:
+                tally.add(first)
+                tally.add(begin, *self._stations[number].rows[:2])
+            seen = f"{len(names)} stations ({', '.join(map(str, names))}) answered nothing at first, and together "
+            seen += f"from {elapsed(begin - first)} after the begin on: {self._others(names, first)}"
+            finding = tally.found(RULES["LN305"], "bus", seen, Severity.WARNING)
+            yield replace(finding, count=len(names), stations=names)
 
     def losses(self, first: int, now: int) -> Iterator[tuple[list[tuple[int, int, int, int]], list[int], int]]:
         """The same as values: losses (last answer, first miss, back or 0: ns; station), stations, the moment."""

@@ -90,3 +90,14 @@ def test_the_same_stations_again_and_again_are_one_finding(every: int, severity:
     (finding,) = together.findings(0, 301 * S)
     assert words in finding.seen
     assert (finding.stations, finding.severity) == ((1, 2), severity)
+
+
+@pytest.mark.parametrize(("came", "stations"), [({1: 30, 2: 30, 3: 31}, (1, 2, 3)), ({1: 30, 2: 90, 3: 0}, None)])
+def test_who_comes_at_one_moment_was_away_together(came: dict[int, int], stations: tuple[int, ...] | None) -> None:
+    together = LostTogether()
+    for second in range(120):
+        for station, begin in came.items():
+            together.settle(asked(station, second + station / 10, second >= begin))
+    found = list(together.findings(0, 120 * S))
+    assert [one.stations for one in found] == ([] if stations is None else [stations])
+    assert all("at first, and together from 30" in one.seen for one in found)
