@@ -202,7 +202,8 @@ def _print(
     _print_traffic(summary, adapter)
     _print_nodes(summary)
     for event in events[:20]:
-        _line("event", f"{iso(event.moment)} {event.kind.value} {event.text} {event.number or ''}".rstrip())
+        count = str(event.number) if event.number > 0 else ""  # -1: nobody knows
+        _line("event", f"{iso(event.moment)} {event.kind.value} {event.text} {count}".rstrip())
     if len(events) > 20:
         _line("event", f"and {sum(summary.events.values()) - 20} more")
     sys.stdout.flush()

@@ -28,6 +28,11 @@ class Analyzer(App[None]):
 
     @property
     @abstractmethod
+    def is_down(self) -> bool:
+        """Whether the port is gone for now."""
+
+    @property
+    @abstractmethod
     def health(self) -> HealthMeter:
         """Health of the bus, a look every now and then."""
 

@@ -144,6 +144,11 @@ class SnifferApp(Analyzer):
         return self.seat.status
 
     @property
+    def is_down(self) -> bool:
+        """Whether its port is gone for now."""
+        return self.seat.is_down
+
+    @property
     def health(self) -> HealthMeter:
         """Its health, a look every now and then."""
         return self.seat.health

@@ -32,6 +32,9 @@ REASON = 20
 SHORTEST = 6
 """Characters of a tab, its number among them, below which the numbers stand alone."""
 
+DOWN = "DOWN"
+"""What is said of a bus whose port is gone for now."""
+
 PORT_EVENTS = (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED)
 
 
@@ -101,16 +104,18 @@ def protocols(status: FeedStatus) -> str:
 
 
 def status_line(
-    status: FeedStatus, store: Store, viewing: Viewing, width: int, health: Health | None = None
+    status: FeedStatus, store: Store, viewing: Viewing, width: int, health: Health | None = None, is_down: bool = False
 ) -> list[tuple[str, str]]:
-    """Pieces of text with a style name each, together at most `width` cells: the port gives way first."""
+    """Pieces of text with a style name each, together at most `width` cells: the port gives way first. `is_down`: the
+    port is gone for now, and so there is no load."""
     state, words = record_state(status), state_words(status)
     reason = sanitized(why_ended(status, store)[0])
     shown_state = f"{words}: {fit(reason, min(cell_len(reason), REASON))}" if reason else words
     pieces = [
         *([(f"searching {sanitized(status.searching)} …", "doubt")] if status.searching else []),
         *([] if status.searching else [(sanitized(status.line), ""), (protocols(status), "")]),
-        *([(f"load {store.load.share(now=status.now):.0%}", "")] if store.session.has_times else []),
+        *([(DOWN, "bad")] if is_down else []),
+        *([(f"load {store.load.share(now=status.now):.0%}", "")] if store.session.has_times and not is_down else []),
         *([] if health is None else [(f"health {health.score}", _health_style(health.score))]),
         (f"err {store.error_total}", "bad" if store.error_total else ""),
         (shown_state, STATE_STYLES.get(state, "")),
@@ -164,7 +169,7 @@ class StatusHeader(Widget):
     def bring_up(self) -> None:
         """Draw again if anything changed."""
         app = analyzer(self)
-        pieces = status_line(app.status, app.store, app.viewing, self.size.width, app.health.bus)
+        pieces = status_line(app.status, app.store, app.viewing, self.size.width, app.health.bus, app.is_down)
         if pieces != self._pieces:
             self._pieces = pieces
             self.refresh()

@@ -28,6 +28,10 @@ def news(seat: Seat, bus: str) -> Iterator[Notice]:
         seat.told_trouble = trouble
         said = bus + (sanitized(trouble) or "it goes on")
         yield Notice(said, "recording", "error" if trouble else "information")
+    if seat.is_down != seat.told_down:
+        seat.told_down, of_port = seat.is_down, seat.last_of_port()
+        said = bus + sanitized("" if of_port is None else of_port.text)
+        yield Notice(said, "the port is looked for" if seat.is_down else "the port", "warning")
     if store.dropped_rows and not seat.told_dropped:
         seat.told_dropped = True
         file = "the file keeps all" if status.in_file else "nothing is recorded"

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from sniff.bus.feed import Feed, FeedStatus
-from sniff.engine.session import LineEventKind
+from sniff.engine.session import LineEvent, LineEventKind
 from sniff.tui.health_meter import HealthMeter
 from sniff.tui.view_state import Viewing
 
@@ -49,9 +49,10 @@ class Seat:
     told_end: bool = False
     told_dropped: bool = False
     told_trouble: str = ""
+    told_down: bool = False
     health: HealthMeter = field(default_factory=HealthMeter)
     _events_seen: int = 0  # of the line
-    _of_port: LineEventKind | None = None  # the newest of those
+    _of_port: LineEvent | None = None  # the newest of those
 
     @classmethod
     def of(cls, feed: Feed, start_screen: str) -> Seat:
@@ -78,18 +79,24 @@ class Seat:
         """How the bus is."""
         if self.status.live and self.status.ended:
             return BusState.ENDED
-        if self.status.live and self._port() is LineEventKind.UNPLUGGED:
+        if self.is_down:
             return BusState.DOWN
         if self.status.trouble:
             return BusState.FAILS
         return BusState.SEARCHING if self.status.searching else BusState.WELL
 
-    def _port(self) -> LineEventKind | None:
+    @property
+    def is_down(self) -> bool:
+        """Whether its port is gone, and is looked for."""
+        of_port = self.last_of_port() if self.status.live and not self.status.ended else None
+        return of_port is not None and of_port.kind is LineEventKind.UNPLUGGED
+
+    def last_of_port(self) -> LineEvent | None:
         """What befell its port last. A bus may have an event a second: each is looked at once."""
         events = self.feed.store.line_events
         for event in events[self._events_seen :]:
             if event.kind in _OF_PORT:
-                self._of_port = event.kind
+                self._of_port = event
         self._events_seen = len(events)
         return self._of_port
 

@@ -106,12 +106,14 @@ def test_a_bus_that_fails_is_marked_and_the_others_go_on(feeds: list[StoreFeed])
         assert "roof DOWN" in bar(see)
         assert "cellar ENDED" in bar(see)
         assert any("cellar: its process was ended" in notice for notice in see.notices())
+        assert any("roof: /dev/roof is gone (No such device)" in notice for notice in see.notices())
         before = cellar.store.last_no
         more = heard([Exchange(at, *asked(1, 0, 5), S // 100)], random.Random(1))
         observe(outputs(more, cellar.store.session), cellar.store)
         roof.store.add_line_event(LineEvent(at + S, LineEventKind.REPLUGGED, "/dev/roof is back"))
         await see.poll()
         assert "DOWN" not in bar(see)
+        assert any("roof: /dev/roof is back" in notice for notice in see.notices())
         assert cellar.store.last_no > before
 
     look(feeds, script)

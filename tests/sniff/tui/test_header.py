@@ -33,6 +33,13 @@ def test_a_search_stands_in_the_place_of_what_is_searched_for(busy_bus: Any) -> 
     assert text == "/dev/ttyUSB0 searching 9600,8N1 … load 16% err 5 REC 12.3 MB FOLLOW"
 
 
+def test_a_port_that_is_looked_for_has_no_load(busy_bus: Any) -> None:
+    viewing = Viewing(busy_bus.store, follow=True)
+    pieces = status_line(LIVE, busy_bus.store, viewing, 80, is_down=True)
+    assert "".join(text for text, _ in pieces) == "/dev/ttyUSB0 19200,8E1 modbus-rtu DOWN err 5 REC 12.3 MB FOLLOW"
+    assert ("DOWN", "bad") in pieces
+
+
 def test_frozen_says_how_many_rows_came(busy_bus: Any) -> None:
     viewing = Viewing(busy_bus.store, follow=True)
     viewing.freeze(True)
