@@ -18,6 +18,7 @@ from sniff.devices import with_devices
 from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
+from sniff.formats import table
 from sniff.formats.linktypes import held_by_protocols, written_link_types
 
 TABLES = (".csv", ".parquet")
@@ -47,6 +48,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Read, write, say what was lost."""
+    suffixes = dict.fromkeys((*table.writers("items_writer"), *table.writers("frames_writer"), *TABLES))
+    if not args.output.lower().endswith(tuple(suffixes)):
+        raise Failure(f"{args.output}: unknown suffix; expected one of {' '.join(suffixes)}", USAGE)
     capture = arguments.open_capture(args.source)
     session = arguments.settings_of(args, capture.session, args.source)
     if args.output.lower().endswith(TABLES):

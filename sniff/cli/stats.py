@@ -1,5 +1,5 @@
 """Tables: nodes (each station), health (bus and stations, and why), transactions (by kind and verdict), latency (each
-station's response times), load (by second or --every), ring (of a protocol that passes a token), stations (that it
+station's response times), load (by second, or longer), ring (of a protocol that passes a token), stations (that it
 serves: lost, syncs, repeats, illegal), polls (the master's programme: each request, how often
 it is asked, what became of it, and when that changed). Response times are uncertain by what the adapter may hold
 back: see `info`. Of a PORT or a configured bus: the table as it becomes, until Ctrl-C or --duration, then as it is;
@@ -19,7 +19,7 @@ from dissectors import registry
 from dissectors.histogram import Histogram
 from dissectors.line import MS, NS_PER_S
 from dissectors.tracker import Verdict
-from sniff.analysis.load import Second
+from sniff.analysis.load import Load, Second
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import station_word
@@ -40,6 +40,9 @@ if TYPE_CHECKING:
     from sniff.engine.capture import Capture
     from sniff.engine.table import Table
 
+MOST_ROWS = 100
+ROW_LENGTHS = (1, 5, 10, 30, 60, 300, 600, 1800, 3600, 21_600, 86_400)
+"""Seconds that a row of load may stand for, where nobody says for how many."""
 TABLES = ("nodes", "health", "transactions", "latency", "load", "ring", "stations", "polls")
 
 
@@ -52,7 +55,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--table", choices=TABLES, help="which table; may also stand beside the files (default: nodes)")
     arguments.add_line(parser)
     arguments.add_devices(parser)
-    parser.add_argument("--every", type=arguments.duration, metavar="TIME", help="load: length of a row (default: 1s)")
+    parser.add_argument(
+        "--every",
+        type=arguments.duration,
+        metavar="TIME",
+        help=f"load: length of a row (default: such that there are {MOST_ROWS} at most; with --json and --csv 1s)",
+    )
     style = parser.add_mutually_exclusive_group()
     style.add_argument("--json", action="store_const", const="json", dest="style", help="one JSON object a row")
     style.add_argument("--csv", action="store_const", const="csv", dest="style", help="comma-separated values")
@@ -148,7 +156,8 @@ def _write(args: argparse.Namespace, table: str, summary: Summary, kinds: _Kinds
     elif not session.has_times:
         raise Failure("load: this capture does not say when anything came", USAGE)
     else:
-        tables.write(LOAD_HEADINGS, _load(summary, int((args.every or 1) * NS_PER_S)), args.style)
+        tables.write(LOAD_HEADINGS, _load(summary, _row_length(args, summary.load)), args.style)
+        _say_forgotten(summary.load)
 
 
 def _listen(args: argparse.Namespace, port: str, table: str) -> int:
@@ -277,6 +286,22 @@ def _node(node: Node) -> tuple[Cell, ...]:
 def _quantiles(latency: Histogram) -> tuple[Cell, ...]:
     values = (latency.least, latency.quantile(0.5), latency.quantile(0.95), latency.most)
     return (latency.count, *(None if value is None else value / MS for value in values))
+
+
+def _row_length(args: argparse.Namespace, load: Load) -> int:
+    """ns of a row: as it is wanted, else a second for programs, and for people as little as keeps the rows few."""
+    if args.every is not None:
+        return int(args.every * NS_PER_S)
+    if args.style != "text" or load.first is None or load.last is None:
+        return NS_PER_S
+    whole = load.last // NS_PER_S - load.first // NS_PER_S
+    return next((every for every in ROW_LENGTHS if whole // every < MOST_ROWS), whole // MOST_ROWS + 1) * NS_PER_S
+
+
+def _say_forgotten(load: Load) -> None:
+    first = min(load.seconds, default=None)
+    if first is not None and load.first is not None and load.first // NS_PER_S < first:
+        print(f"sniff485: load: of what came before {iso(first * NS_PER_S)} seconds are not kept", file=sys.stderr)
 
 
 def _load(summary: Summary, every: int) -> list[tuple[Cell, ...]]:

@@ -9,6 +9,10 @@ from typing import Any
 
 import pytest
 
+from dissectors.line import LineSettings
+from sniff.analysis.load import Load, Second
+from sniff.cli import stats
+
 CHAR = 11 / 9600
 HEAD = "#!sniff-capture 1\n# line: 9600,8E1\n# protocol: modbus-rtu\n# start: 2026-03-01T10:00:00Z\n"
 FRAME = "01 03 00 00 00 02 C4 0B"
@@ -58,3 +62,18 @@ def test_what_was_not_heard_is_said(sniff485: Callable[..., Any], tmp_path: Path
     assert told["unheard_seconds"] == 600
     assert told["load"] == pytest.approx(348 * 11 / 19200 / (told["seconds"] - 600), rel=1e-4)
     assert ", 10.0 min of it not heard)" in sniff485("info", path).out
+
+
+def test_a_table_for_people_is_no_row_a_second(sniff485: Callable[..., Any], tmp_path: Path) -> None:
+    path = tmp_path / "a.cap.txt"
+    path.write_text(HEAD + f"+20 {FRAME}\n" + f"+7000 {FRAME}\n" * 40)  # 280 s
+    ran = sniff485("stats", path, "load")
+    assert [line.split()[0][11:19] for line in ran.out.splitlines()[1:4]] == ["10:00:00", "10:00:05", "10:00:10"]
+    assert ran.err == ""
+    assert len(sniff485("stats", path, "load", "--csv").out.splitlines()) == 1 + 41
+
+
+def test_seconds_that_are_not_kept_are_said(capsys: pytest.CaptureFixture[str]) -> None:
+    load = Load(LineSettings.parse("9600,8E1"), seconds={12: Second(), 13: Second()}, first=10**10, last=13 * 10**9)
+    stats._say_forgotten(load)
+    assert "before 1970-01-01T00:00:12.000000000Z" in capsys.readouterr().err
