@@ -26,12 +26,17 @@ class OfTimes(OfOthers):
 def nearest(word: str, known: Iterable[str], most: int = 8) -> str:
     """ "did you mean 'late'?", or which there are."""
     names = list(dict.fromkeys(known))
-    lowered = {name.lower(): name for name in names}
-    close = difflib.get_close_matches(word.lower(), lowered, 1, 0.6)
-    if close:
-        return f"did you mean {shown(lowered[close[0]])}?"
+    close = closest(word, names)
+    if close is not None:
+        return f"did you mean {shown(close)}?"
     more = ", …" if len(names) > most else ""
     return f"expected one of {', '.join(map(_written, names[:most]))}{more}"
+
+
+def closest(word: str, known: Iterable[str]) -> str | None:
+    """The one that is written most alike, None where none is."""
+    lowered = {name.lower(): name for name in known}
+    return next((lowered[one] for one in difflib.get_close_matches(word.lower(), lowered, 1, 0.6)), None)
 
 
 def shown(name: str) -> str:

@@ -12,7 +12,7 @@ from sniff.engine.engine import Row
 from sniff.filter import fields, told
 from sniff.filter.asking import delta, leaf, nowhere
 from sniff.filter.comparing import With
-from sniff.filter.errors import FilterError, OfOthers, OfTimes, nearest
+from sniff.filter.errors import FilterError, OfOthers, OfTimes, closest, nearest, shown
 from sniff.filter.expressions import Expression
 from sniff.filter.literals import number_of
 from sniff.filter.plan import Begins, Leaf, TestNode, joined
@@ -211,10 +211,12 @@ class Names:
 
     def unknown(self, name: str) -> str:
         """That there is no such name, and which is nearest."""
-        own = fields.known_names(self.dissector)
+        own = [*fields.known_names(self.dissector), *self.layers, *told.TYPES, *told.names(self.scope.devices)]
         others = [one for each in fields.protocols(self.dissector)[1:] for one in fields.types_of(each)]
-        points = [*told.TYPES, *told.names(self.scope.devices)]
-        close = nearest(name, [*own, *self.layers, *others, *points], most=12)
+        meant = _MEANT.get("address" if name.lower() == self.dissector.noun.lower() else name.lower())
+        known = [one for one in own if one.rpartition(".")[2] == name]
+        found = meant or next(iter(known), None) or closest(name, own) or closest(name, others)
+        close = nearest(name, own, most=12) if found is None else f"did you mean {shown(found)}?"
         return f"unknown name {name!r} ({close}; show --help-fields lists them)"
 
     def no_field(self, value: Value, written: str) -> FilterError:
@@ -226,6 +228,21 @@ class Names:
 
 _COLUMNS = {"func_code": "func", "unit_id": "addr", "frame_type": "func", "reference_num": "register"}
 """What every protocol has, by how the name of one ends."""
+
+_MEANT = {
+    **dict.fromkeys(("address", "station", "node", "unit", "slave", "device", "id"), "addr"),
+    **dict.fromkeys(("time", "timestamp", "when"), "frame.time"),
+    **dict.fromkeys(("latency", "delay", "response_time", "answer_time"), "latency_ms"),
+    **dict.fromkeys(("function", "function_code", "fc", "command"), "func"),
+    **dict.fromkeys(("crc", "checksum", "damaged", "bad"), "damage"),
+    **dict.fromkeys(("length", "size"), "len"),
+    **dict.fromkeys(("info", "message", "what"), "text"),
+    **dict.fromkeys(("result", "outcome", "status"), "verdict"),
+    **dict.fromkeys(("octets", "bytes", "payload", "data"), "hex"),
+    **dict.fromkeys(("type", "kinds"), "kind"),
+    "reg": "register",
+}
+"""What other programs, and people, call what every protocol has."""
 
 
 def _listed(names: list[str], word: str = "and") -> str:

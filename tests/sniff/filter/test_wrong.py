@@ -13,6 +13,13 @@ CAPTURE = str(Path(__file__).parents[3] / "captures" / "rtu-usual-faults.cap.txt
 
 WRONG = (
     ("dst = 3", "did you mean ==?"),
+    ("slave == 3", "did you mean 'addr'?"),
+    ("Station == 3", "did you mean 'addr'?"),
+    ("time > 10:02", "did you mean 'frame.time'?"),
+    ("latency > 5", "did you mean 'latency_ms'?"),
+    ("crc", "did you mean 'damage'?"),
+    ("func_code == 3", "did you mean 'modbus.func_code'?"),  # its own before those of others
+    ("address == 3", "did you mean 'addr'?"),
     ("dst == foo", "is a station's address, 'foo' is none"),
     ('dst > "abc"', "is a station's address"),
     ("dst == 3ms", "is a station's address"),
