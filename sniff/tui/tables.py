@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import ClassVar
 
+from rich.segment import Segment
 from rich.text import Text
 from textual.binding import Binding, BindingType
+from textual.strip import Strip
 from textual.widgets import DataTable
 
 from sniff.tui.key_names import named
@@ -52,6 +54,14 @@ class StationTable(DataTable[Text], inherit_bindings=False):
             for column, cell in zip(columns, cells, strict=True):
                 if self.get_cell(key, column) != cell:
                     self.update_cell(key, column, cell, update_width=True)
+
+    def render_line(self, y: int) -> Strip:
+        """A line; one that goes on beyond the right edge ends with a sign of it."""
+        line, width = super().render_line(y), self.scrollable_content_region.width
+        if self.virtual_size.width - self.scroll_offset.x <= width or not line.text.strip():
+            return line
+        *_, last = line
+        return Strip.join([line.crop(0, width - 1), Strip([Segment("…", last.style)])])
 
     def key_here(self) -> str | None:
         """Key of the row under the cursor, None without rows."""

@@ -12,7 +12,7 @@ from rich.text import Text
 from textual.app import App, ComposeResult
 
 from sniff.tui.plot import HAS_PLOT, HistoryPlot, ticks
-from sniff.tui.tables import count_cell
+from sniff.tui.tables import StationTable, count_cell
 from sniff.tui.timeline_picture import (
     LABEL,
     TELLING,
@@ -136,3 +136,22 @@ def test_a_plot_that_grows_gets_more_numbers_at_its_axis() -> None:
 
     few, many = asyncio.run(script())
     assert few < many
+
+
+def test_a_table_wider_than_its_screen_says_so() -> None:
+    class Narrow(App[None]):
+        def compose(self) -> ComposeResult:
+            yield StationTable()
+
+    async def lines(cells: int, rows: int) -> set[str]:
+        app = Narrow()
+        async with app.run_test(size=(40, 10)) as pilot:
+            table = app.query_one(StationTable)
+            table.add_column("what", key="what")
+            table.fill((str(at), [Text("y" * cells)]) for at in range(rows))
+            await pilot.pause()
+            shown = table.scrollable_content_region
+            return {table.render_line(at).text[: shown.width].rstrip()[-1] for at in range(shown.height)}
+
+    assert asyncio.run(lines(60, 30)) == {"…"}
+    assert "…" not in asyncio.run(lines(20, 30))
