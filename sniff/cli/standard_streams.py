@@ -157,11 +157,20 @@ class _Closed(io.RawIOBase):
     _given_up = False
 
 
+SIGNS = str.maketrans(
+    {"←": "<-", "→": "->", "−": "-", "–": "-", "—": "-", "×": "x", "…": "...", "±": "+/-", "≤": "<=", "≥": ">="}
+    | {"└": "`-", "│": "|", "─": "-", "·": "-", "•": "*", "µ": "u", "Ω": "Ohm", "░": "?"}
+)
+"""What stands for our own signs where the output has none of them."""
+
+
 def _escape(error: UnicodeError) -> tuple[str, int]:
-    """\\u2190 and such, as JSON has it, so that JSON stays JSON; where the output has no such character (Windows writes
-    files as cp1252)."""
+    """What is printed where the output has no such character (Windows writes files as cp1252): in a line of JSON
+    \\u2190 and such, so that it says the same; elsewhere what people write for our own signs."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     import json  # a terminal has nearly all characters
 
-    return json.dumps(error.object[error.start : error.end])[1:-1], error.end
+    there_is_none = error.object[error.start : error.end]
+    is_json = error.object.lstrip()[:1] in ("{", "[", '"')
+    return json.dumps(there_is_none if is_json else there_is_none.translate(SIGNS))[1:-1], error.end
