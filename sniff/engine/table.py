@@ -9,7 +9,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from itertools import pairwise
+from itertools import pairwise, repeat
 from typing import Any, TypeVar
 
 import numpy as np
@@ -222,72 +222,70 @@ class Table:
 
 def rows_at(table: Table, places: Sequence[int]) -> list[Row]:
     """Rows at some places, in that order: what `Table.row` gives, for less than half."""
-    at = np.asarray(places, np.int64)
-    frames, placed, protocol, names = table.frames, table.placed, table.protocol, table.frames.names
+    odd = table.odd
+    at = np.array([place for place in places if place not in odd], np.int64)
+    made = map(Row, _numbers(table, at), _frames(table, at), _headers(table, at), _placements(table, at))
+    return [odd[place] if place in odd else next(made) for place in places]
+
+
+def _numbers(table: Table, at: Times) -> list[int]:
+    numbers: list[int] = (at + table.first).tolist()
+    return numbers
+
+
+def _frames(table: Table, at: Times) -> Iterator[Frame]:
+    frames = table.frames
     begins = frames.offset[at]
     base = int(begins.min()) if len(at) else 0
     ends = begins + frames.length[at]
     octets = table.octets[base : int(ends.max()) if len(at) else base].tobytes()
-    of_frame = (
-        (begins - base).tolist(),
-        (ends - base).tolist(),
-        *(getattr(frames, name)[at].tolist() for name in ("start", "end", "check", "found", "damage", "expected")),
+    return map(
+        Frame,
+        repeat(table.protocol),
+        [octets[begin:end] for begin, end in zip((begins - base).tolist(), (ends - base).tolist(), strict=True)],
+        frames.start[at].tolist(),
+        frames.end[at].tolist(),
+        [CHECKS[code] for code in frames.check[at].tolist()],
+        [FOUNDS[code] for code in frames.found[at].tolist()],
+        [DAMAGES[code] for code in frames.damage[at].tolist()],
+        _optional(frames.expected, at),
+        repeat(0),
         table.slack[at].tolist(),
     )
-    of_header = (
-        getattr(frames, name)[at].tolist()
-        for name in ("source", "destination", "role", "kind", "function", "address", "count", "ok", "error")
+
+
+def _headers(table: Table, at: Times) -> Iterator[Header]:
+    frames, names = table.frames, table.frames.names
+    return map(
+        Header,
+        repeat(table.protocol),
+        _optional(frames.source, at),
+        _optional(frames.destination, at),
+        [ROLES[code] for code in frames.role[at].tolist()],
+        [names[name] for name in frames.kind[at].tolist()],
+        _optional(frames.function, at),
+        _optional(frames.address, at),
+        _optional(frames.count, at),
+        frames.ok[at].tolist(),
+        [names[name] if name else None for name in frames.error[at].tolist()],
     )
-    of_place = (getattr(placed, name)[at].tolist() for name in ("tx", "role", "source", "destination"))
-    rows: list[Row] = []
-    for (
-        (place, begin, end, start, stop, check, found, damage, expected, slack),
-        (source, destination, role, kind, function, address, count, ok, error),
-        (tx, placed_role, placed_source, placed_destination),
-    ) in zip(
-        zip(places, *of_frame, strict=True), zip(*of_header, strict=True), zip(*of_place, strict=True), strict=True
-    ):
-        odd = table.odd.get(place)
-        if odd is not None:
-            rows.append(odd)
-            continue
-        no = table.first + place
-        frame = Frame(
-            protocol,
-            octets[begin:end],
-            start,
-            stop,
-            CHECKS[check],
-            FOUNDS[found],
-            DAMAGES[damage],
-            None if expected == NONE else expected,
-            0,
-            slack,
-        )
-        header = Header(
-            protocol,
-            None if source == NONE else source,
-            None if destination == NONE else destination,
-            ROLES[role],
-            names[kind],
-            None if function == NONE else function,
-            None if address == NONE else address,
-            None if count == NONE else count,
-            ok,
-            names[error] if error else None,
-        )
-        if not tx:
-            rows.append(Row(no, frame, header))
-            continue
-        placement = Placement(
-            no,
-            tx,
-            ROLES[placed_role],
-            None if placed_source == NONE else placed_source,
-            None if placed_destination == NONE else placed_destination,
-        )
-        rows.append(Row(no, frame, header, placement))
-    return rows
+
+
+def _placements(table: Table, at: Times) -> list[Placement | None]:
+    placed = table.placed
+    columns = zip(
+        _numbers(table, at),
+        placed.tx[at].tolist(),
+        placed.role[at].tolist(),
+        _optional(placed.source, at),
+        _optional(placed.destination, at),
+        strict=True,
+    )
+    return [Placement(no, tx, ROLES[role], source, goal) if tx else None for no, tx, role, source, goal in columns]
+
+
+def _optional(column: npt.NDArray[Any], at: Times) -> list[int | None]:
+    return [None if value == NONE else value for value in column[at].tolist()]
 
 
 def good_rows(is_frame: Masks, damage: Codes, check: Codes) -> Masks:
