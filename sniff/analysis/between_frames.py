@@ -1,4 +1,4 @@
-"""What comes between frames: stray octets, remains, frames in pieces; whose it is, the frame to come tells. Pure."""
+"""Octets between frames: strays, remains, frames in pieces; whose they are, the frame to come tells. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What came from the capture process and waits for a caller that is behind: bounded, and what it dropped is said."""
+"""Messages of the capture process that wait for a caller who is behind: bounded, and what was dropped is said."""
 
 from __future__ import annotations
 

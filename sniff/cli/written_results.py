@@ -1,4 +1,4 @@
-"""What a recording holds beside its octets when a capture is written: what an engine finds in them, as observers."""
+"""Results of the engine in a recording that is written from a capture: each kind of them an observer."""
 
 from __future__ import annotations
 
