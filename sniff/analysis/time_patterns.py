@@ -7,8 +7,6 @@ every 5 s.
 
 from __future__ import annotations
 
-import cmath
-import math
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -17,11 +15,12 @@ from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Tally, counted, found
 from dissectors.frame import Chunk, Event, Frame, LineError
-from dissectors.line import MS, NS_PER_S
+from dissectors.line import NS_PER_S
 from dissectors.tracker import Transaction
 from dissectors.words import elapsed, milliseconds, percent
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.lost_together import LostTogether
+from sniff.analysis.mains_hum import SAME, MainsHum
 from sniff.analysis.other_settings import Fit, what_fits
 from sniff.analysis.rounds import QUIET, Bouts, Rounds
 from sniff.analysis.sender_findings import MASTER
@@ -32,18 +31,6 @@ from sniff.engine.session import LineEvent, Session
 if TYPE_CHECKING:
     from dissectors.columns import Masks, Times, TransactionColumns
     from sniff.engine.table import Table
-
-MAINS = {20 * MS: "50 Hz", 10 * MS: "twice 50 Hz", 50 * MS // 3: "60 Hz", 25 * MS // 3: "twice 60 Hz"}
-"""Periods, ns: once a wave, and twice (each half wave, as of a dimmer)."""
-
-HUM_LEAST = 15
-HUM_LOCKED = 0.7
-HUM_OWN = 0.35
-STRUCK_LEAST = 5
-"""So many disturbances of known senders' frames tell whether they strike whoever sends."""
-
-HUM_SPAN = 2 * NS_PER_S  # over longer the mains drift
-SAME = 4 * MS  # what follows sooner is the same disturbance
 
 BURSTS_LEAST = 6
 BURSTS_KEPT = 500
@@ -59,14 +46,6 @@ UNREADABLE_KEPT = 8
 STRETCH_OCTETS = 800
 
 _MARKS = LineError.PARITY | LineError.FRAMING | LineError.BREAK
-
-
-@dataclass(slots=True)
-class _Lock:
-    """How well moments keep in step with one period: sums of unit vectors, of trouble and of all else."""
-
-    trouble: complex = 0j
-    others: complex = 0j
 
 
 @dataclass(slots=True)
@@ -115,15 +94,8 @@ class TimePatterns:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._char = session.line.char
-        self._latency = session.adapter.latency
         self._good = self._good_since = 0
-        # hum
-        self._locks = {period: _Lock() for period in MAINS}
-        self._trouble_at: int | None = None
-        self._steps = self._other_steps = 0
-        self._hum = Tally()
-        self._struck: Counter[str] = Counter()  # senders of what is disturbed
-        self._apart: Counter[int] = Counter()  # ms from disturbance to disturbance
+        self._hum = MainsHum(session.adapter.latency)
         # bursts
         self._burst: _Burst | None = None  # the newest, which may go on
         self._bursts: list[_Burst] = []  # those before it
@@ -157,7 +129,7 @@ class TimePatterns:
             self._good += 1
             self._good_since += 1
             self._end_stretch()
-            self._step(event.end, False)
+            self._hum.see_good(event.end)
             return
         if wrong is not None:
             moment: int | None = event.start + (wrong.offset + 1) * self._char
@@ -165,9 +137,8 @@ class TimePatterns:
             moment = event.start
         else:
             moment = None  # somewhere in a long frame
-        if moment is not None and self._step(moment, True):
-            self._hum.add(moment, no)
-            self._struck[sender] += 1
+        if moment is not None:
+            self._hum.see_trouble(moment, no, sender)
         self._see_trouble(no, event, sender)
         if is_good:
             self._end_stretch()
@@ -189,7 +160,7 @@ class TimePatterns:
         self._good += len(ends)
         self._good_since += len(ends)
         self._end_stretch()
-        self._step_over(ends)
+        self._hum.see_many_good(ends)
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
@@ -204,41 +175,6 @@ class TimePatterns:
         if event.kind.is_hole:
             self._silences.miss(event.time)
             self._rounds.miss(event.time)
-
-    def _step(self, moment: int, is_trouble: bool) -> bool:
-        """Measure a moment against the trouble before it; whether it is one of its own."""
-        before = self._trouble_at
-        if is_trouble and (before is None or moment - before > HUM_SPAN or moment < before):
-            self._trouble_at = moment
-            return True
-        if before is None or not SAME < moment - before <= HUM_SPAN:
-            return False
-        for period, lock in self._locks.items():
-            vector = cmath.exp(2j * math.pi * ((moment - before) % period) / period)
-            if is_trouble:
-                lock.trouble += vector
-            else:
-                lock.others += vector
-        if is_trouble:
-            self._steps += 1
-            self._apart[(moment - before) // MS] += 1
-            self._trouble_at = moment
-        else:
-            self._other_steps += 1
-        return is_trouble
-
-    def _step_over(self, moments: Times) -> None:
-        """The same as `_step` for moments without trouble, one or more."""
-        import numpy as np
-
-        before = self._trouble_at
-        if before is None or int(moments[0]) - before > HUM_SPAN < int(moments[-1]) - before:
-            return
-        since = moments - before
-        since = since[(since > SAME) & (since <= HUM_SPAN)]
-        self._other_steps += len(since)
-        for period, lock in self._locks.items():
-            lock.others += complex(np.exp(2j * math.pi * ((since % period) / period)).sum())
 
     def _see_trouble(self, no: int, event: Event, sender: str) -> None:
         burst = self._burst
@@ -289,7 +225,7 @@ class TimePatterns:
 
     def findings(self) -> Iterator[Finding]:
         """All patterns so far."""
-        yield from self._in_step_with_mains()
+        yield from self._hum.findings()
         yield from self._in_bursts()
         yield from self._unreadable()
         yield from self._silences.findings()
@@ -313,38 +249,6 @@ class TimePatterns:
             )
             for together, names, moment in lost
         ]
-
-    def _in_step_with_mains(self) -> Iterator[Finding]:
-        if self._steps < HUM_LEAST:
-            return
-        if 3 * max(self._apart.values()) > self._steps or self._is_of_one_sender():
-            return  # one rhythm of the bus, or one sender's
-        for period, words in MAINS.items():
-            if 6 * self._latency > period:
-                continue
-            lock = self._locks[period]
-            locked = abs(lock.trouble) / self._steps
-            own = abs(lock.others) / self._other_steps if self._other_steps else 0.0
-            chance = math.exp(-self._steps * locked * locked)  # Rayleigh
-            angle = cmath.phase(lock.trouble) * period / (2 * math.pi)
-            if locked < HUM_LOCKED or own > HUM_OWN or chance > 1e-6 or abs(angle) > 0.15 * period:
-                continue
-            seen = (
-                f"{self._steps + 1} disturbances come in step with {words}: {locked:.0%} locked to "
-                f"{milliseconds(period)}, what is undisturbed {own:.0%}"
-            )
-            yield self._hum.found(RULES["LN301"], "bus", seen)
-            return
-
-    def _is_of_one_sender(self) -> bool:
-        """Whether nearly all that is disturbed is one sender's, or that of somebody who is not known.
-
-        Where frames of several known ones are struck, the rest needs no sender: hum in silence is beside nobody.
-        """
-        known = Counter({name: count for name, count in self._struck.items() if name != "bus"})
-        if known.total() >= STRUCK_LEAST and 10 * max(known.values()) <= 9 * known.total():
-            return False
-        return 10 * max(self._struck.values()) > 9 * self._struck.total()
 
     def _in_bursts(self) -> Iterator[Finding]:
         """All bursts; where single errors lie between them, those of several."""
