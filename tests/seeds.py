@@ -22,8 +22,8 @@ def seeds(many: int, usual: int = 1) -> range:
 
 
 def examples(many: int) -> int:
-    """Examples of a property for which the usual number is too few: `many` in a search, a third in the suite."""
-    return many if IS_SEARCH else max(25, many // 3)
+    """Examples of a property for which the usual number is too few: `many` in a search, a sixth in the suite."""
+    return many if IS_SEARCH else max(12, many // 6)
 
 
 def some(things: Sequence[T], every: int) -> Sequence[T]:

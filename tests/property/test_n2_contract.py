@@ -12,6 +12,7 @@ from dissectors.frame import Check, Chunk, Event, Frame, LineError, Mark, Noise
 from dissectors.line import Timing
 from dissectors.n2.framing import MAX_LENGTH, N2Framer
 from sniff.testing.framer_contract import framer_contract
+from tests.seeds import examples
 
 relaxed = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 MS = 1_000_000
@@ -21,7 +22,7 @@ COMMANDS = [b">0111010387\r", b">01FA7\r", b">0104C5\r", b">01250141a80000E7\r",
 ANSWERS = [b"A0042910000F0\r", b"A4064\r", b"A1061\r", b"AC073\r", b"A0060\r", b"A301004248000086\r"]
 SHORT = [b"A\r", b"N11\r", b"N00\r"]
 
-TestN2Contract = framer_contract(N2Framer, st.sampled_from(COMMANDS + ANSWERS))
+TestN2Contract = framer_contract(N2Framer, st.sampled_from(COMMANDS + ANSWERS), examples=examples(120))
 
 wire = st.one_of(
     st.binary(max_size=12),

@@ -12,6 +12,7 @@ from dissectors.frame import Check, Chunk, Damage, Frame
 from dissectors.line import Timing
 from dissectors.plain_framers import Delimited, DelimitedFramer, LengthFramer, Lengthy
 from sniff.testing.framer_contract import framer_contract
+from tests.seeds import examples
 
 START = 10**18
 
@@ -43,8 +44,8 @@ def lengthy(timing: Timing) -> LengthFramer:
 
 
 plain = st.text("abcdefgh", min_size=1, max_size=12).map(str.encode)
-TestDelimitedContract = framer_contract(delimited, plain.map(bracket))
-TestLengthContract = framer_contract(lengthy, st.binary(min_size=2, max_size=12).map(count))
+TestDelimitedContract = framer_contract(delimited, plain.map(bracket), examples=examples(120))
+TestLengthContract = framer_contract(lengthy, st.binary(min_size=2, max_size=12).map(count), examples=examples(120))
 
 
 def frames(framer: LengthFramer | DelimitedFramer, octets: bytes) -> list[tuple[bytes, bool]]:

@@ -13,6 +13,7 @@ from dissectors.profibus.envelope import is_sound
 from dissectors.profibus.framing import ProfibusFramer
 from dissectors.profibus.telegram import telegram, token
 from sniff.testing.framer_contract import framer_contract
+from tests.seeds import examples
 
 MS = 1_000_000
 START = 10**18
@@ -26,7 +27,9 @@ OUTPUTS = telegram(8, 2, 0x5D, bytes(range(32)))
 SD3 = bytes.fromhex("A208025D01020304050607088B16")
 SC = b"\xe5"
 
-TestProfibusContract = framer_contract(ProfibusFramer, st.sampled_from([STATUS, ANSWER, DIAGNOSIS, TOLD, OUTPUTS, SD3]))
+TestProfibusContract = framer_contract(
+    ProfibusFramer, st.sampled_from([STATUS, ANSWER, DIAGNOSIS, TOLD, OUTPUTS, SD3]), examples=examples(120)
+)
 
 telegrams = st.builds(
     telegram,

@@ -32,6 +32,7 @@ from sniff.engine.session import LineEvent, LineEventKind, Session
 from sniff.engine.table import Table, joined
 from sniff.filter import compile_filter
 from tests.bench import bulk_mstp, bulk_rtu
+from tests.seeds import IS_SEARCH
 
 NAMES = ("mstp", "modbus-rtu")
 FILTERS = (
@@ -55,7 +56,8 @@ FILTERS = (
 PARTLY = {FILTERS[5], FILTERS[14]}
 """Those of which columns do not say all."""
 CUTS = st.lists(st.integers(0, 10_000), max_size=40)
-BUSES = settings(deadline=None, max_examples=12)
+BUSES = settings(deadline=None, max_examples=12 if IS_SEARCH else 6)
+JUDGED = settings(deadline=None, max_examples=6 if IS_SEARCH else 3)
 
 
 @cache
@@ -196,7 +198,7 @@ def test_what_is_dropped_is_the_oldest(name: str, cuts: list[int], pack: int, ke
 
 
 @pytest.mark.parametrize("name", NAMES)
-@settings(deadline=None, max_examples=6)
+@JUDGED
 @given(CUTS, st.lists(st.integers(1, 400), min_size=1, max_size=20), st.integers(0, 20))
 def test_judged_later_is_judged_the_same(name: str, cuts: list[int], slices: list[int], event_after: int) -> None:
     session = bus_of(name)[0]
@@ -223,7 +225,7 @@ def test_judged_later_is_judged_the_same(name: str, cuts: list[int], slices: lis
 
 
 @pytest.mark.parametrize("name", NAMES)
-@settings(deadline=None, max_examples=6)
+@JUDGED
 @given(CUTS, st.integers(20, 300))
 def test_what_is_dropped_was_judged_before(name: str, cuts: list[int], keep: int) -> None:
     session = bus_of(name)[0]
