@@ -41,7 +41,7 @@ def _kernel_always(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(framing, "LEAST", 1)
 
 
-@pytest.mark.parametrize("seed", seeds(60, 6))
+@pytest.mark.parametrize("seed", seeds(60, 3))
 @pytest.mark.parametrize("trouble", TROUBLES)
 def test_of_damage_beside_one_more_trouble(trouble: str, seed: int) -> None:
     assert_read_equally(seed, ["damage", trouble], False, 150)

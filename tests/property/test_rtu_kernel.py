@@ -252,8 +252,8 @@ _RARE = (3, 7, 8, 11, 12, 17, 20, 22, 24, 43)
 @pytest.mark.parametrize("timing", TIMINGS, ids=str)
 def test_of_disturbed_buses(seed: int, timing: Timing) -> None:
     dice = random.Random(seed)
-    for codes in ((3, 6, 16), _ALL, _RARE):
-        for share in (0.02, 0.3):
+    for place, codes in enumerate(((3, 6, 16), _ALL, _RARE), TIMINGS.index(timing)):
+        for share in in_turn((0.02, 0.3), place, 2):
             frames = _disturbed(bus(seed, 150 if IS_SEARCH else 100, codes), dice, share)
             assert_equal(RTU, _apart(frames, timing), timing)
             assert_equal(RTU, _glued(frames, timing, dice), timing)

@@ -78,7 +78,7 @@ def test_logs_cut_anywhere(name: str, tmp_path: Path) -> None:
     whole = (LOGS / name).read_bytes()
     expected = b"".join(frames_of(LOGS / name))
     path = tmp_path / name
-    cuts = min(12 if IS_SEARCH else 6, max(3, 30_000 // len(whole)))
+    cuts = min(12 if IS_SEARCH else 3, max(3, 30_000 // len(whole)))
     for end in range(0, len(whole), max(1, len(whole) // cuts)):
         write_anew(path, whole[:end])
         try:

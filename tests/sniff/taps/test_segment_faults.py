@@ -17,7 +17,7 @@ from sniff.taps.matching import matched
 from sniff.taps.verdict import FaultPlace, SegmentFault, SegmentFaultKind, TapSide, Traffic, faults, traffic
 from sniff.taps.words import sentence
 from tests.bus_delivery import FTDI_LATENCY, MS, Wire, exact, ftdi
-from tests.seeds import some
+from tests.seeds import in_turn, some
 from tests.sniff.taps.segment import (
     Segment,
     bit_errors,
@@ -130,8 +130,10 @@ def compared(taps: list[TapFrames], doubt: int) -> tuple[dict[int, Traffic], lis
     return senders, faults(senders, doubt)
 
 
-@pytest.mark.parametrize("adapter", ADAPTERS)
-@pytest.mark.parametrize("name", some(tuple(FAULTS), 2))
+@pytest.mark.parametrize(
+    ("name", "adapter"),
+    [(name, one) for place, name in enumerate(some(tuple(FAULTS), 2)) for one in in_turn(tuple(ADAPTERS), place, 2)],
+)
 def test_the_right_side_is_named(name: str, adapter: str) -> None:
     expected = FAULTS[name][1]
     _, found = judged(wires_of(name), ADAPTERS[adapter])
