@@ -38,7 +38,7 @@ class OddAnswers:
         code, asked = seen.header.function, request.octets[1]
         if code == asked:
             return False
-        if _has_a_length_of_none(seen):
+        if has_a_length_of_none(seen):
             return True
         function = FUNCTIONS.get(code) if code is not None else None
         if function is None:
@@ -51,7 +51,7 @@ class OddAnswers:
         if request.unit != seen.unit or not self._may_be_answered(request, seen):
             return None
         if not request.is_for(seen.octets):
-            return another_function(request.octets, seen.octets) if _has_a_length_of_none(seen) else None
+            return another_function(request.octets, seen.octets) if has_a_length_of_none(seen) else None
         if FUNCTIONS[request.octets[1]].writes:
             return None
         if seen.header.error is not None:
@@ -105,7 +105,7 @@ class OddAnswers:
         return (late, answered) if late is not None and is_waited_for else None
 
 
-def _has_a_length_of_none(seen: Seen) -> bool:
+def has_a_length_of_none(seen: Seen) -> bool:
     """Whether a good frame is as long as neither a request nor an answer of its function is."""
     frame, header = seen.frame, seen.header
     return header.ok and header.error is not None and frame.expected not in (None, len(frame.octets))

@@ -28,6 +28,7 @@ from dissectors.modbus.envelope import readable_adu
 from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, echo_of
 from dissectors.modbus.exchanges import FIRST_SEEN
 from dissectors.modbus.functions import BROADCAST, ITEMS_ASKED
+from dissectors.modbus.odd_answers import has_a_length_of_none
 from dissectors.modbus.pairing import another_function, is_listen_only, is_restart, mismatch
 from dissectors.modbus.promptness import AT_ONCE, has_no_layout
 from dissectors.modbus.tracker_memory import TrackerMemory
@@ -206,8 +207,8 @@ class ModbusTracker(TrackerMemory):
             why = None if request.fault else mismatch(request.octets, seen.octets)
             # a station may answer with the value that it really took, or with a wrong length; not where another's
             # answer came between, since the one that was late may be this very request
-            same_place = request.octets[:4] == seen.octets[:4] and not request.disturbed
-            near = same_place and self._times.is_prompt(request, seen)
+            is_odd = request.octets[:4] == seen.octets[:4] or has_a_length_of_none(seen)
+            near = is_odd and not request.disturbed and self._times.is_prompt(request, seen)
             if (why is None or near or seen.header.role is Role.UNKNOWN) and self._times.in_time(request, seen):
                 return self._answer(request, seen, why)
             if self._times.is_doubtful(request, seen, fits=why is None):

@@ -36,6 +36,8 @@ def well(bus, count=4):
         ("050300100002", "0503000400070008", "10 octets where its own count makes it 8"),
         ("050400100002", "05050400070008", "function 0x05 instead of 0x04 or 0x84"),
         ("050300100002", "050304015401", "8 octets where its own count makes it 9"),
+        ("050600100065", "05060065", "6 octets where its own count makes it 8"),
+        ("050600100065", "050602", "5 octets where its own count makes it 8"),
     ],
 )
 def test_an_answer_in_the_shape_of_a_request_does_not_fit(bus, asked, answer, words):
