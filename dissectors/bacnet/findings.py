@@ -30,6 +30,7 @@ from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.bacnet.ring_window import MstpRingWindow
 from dissectors.bacnet.rules import RULES
 from dissectors.bacnet.told_silent import ToldSilent
+from dissectors.bacnet.told_times import ToldTimes
 from dissectors.bacnet.unheard import TRUSTED
 from dissectors.chances import is_rare
 from dissectors.findings import Finding, Severity, as_consequence, counted, times
@@ -269,7 +270,7 @@ class MstpFindings:
         self._content = ContentFindings()
         self._instances, self._routers, self._lengths = DeviceInstances(), RouterFindings(), LongAnswers()
         self._refusals, self._promises, self._numbers = Refusals(), BrokenPromises(), OtherNumbers()
-        self._silent = ToldSilent()
+        self._silent, self._clocks = ToldSilent(), ToldTimes(timing)
         self._newest: tuple[tuple[int, Event | None], ...] = ()  # the newest two rows, their numbers before them
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None = None) -> None:
@@ -280,6 +281,7 @@ class MstpFindings:
         self._routers.see(no, event, header)
         self._lengths.see(no, event, header)
         self._silent.see(no, event, header)
+        self._clocks.see(no, event, header)
         self._newest = (*self._newest[-1:], (no, event))
 
     def settle(self, transaction: Transaction) -> None:
@@ -310,6 +312,7 @@ class MstpFindings:
         self._routers.take(rows)
         self._lengths.take(rows)
         self._silent.take(rows)
+        self._clocks.take(rows)
         self._settle_many(rows)
 
     def _settle_many(self, rows: RowColumns) -> None:
@@ -367,6 +370,6 @@ class MstpFindings:
         ring = self._observer.ring()
         others = (*self._refusals.findings(), *self._content.findings(), *self._instances.findings(ring.nodes))
         others += (*self._routers.findings(), *self._promises.findings(ring), *self._lengths.findings())
-        others += tuple(self._numbers.findings(ring))
+        others += (*self._numbers.findings(ring), *self._clocks.findings())
         made = (*self._silent.told(judge(ring)), *others)
         return tuple(sorted(made, key=_gravest_first))

@@ -8,6 +8,7 @@ from dissectors.bacnet.content_findings import CONTENT_RULES
 from dissectors.bacnet.long_answers import LENGTH_RULES
 from dissectors.bacnet.rules_of_answers import ANSWER_RULES
 from dissectors.bacnet.rules_of_polls import POLL_RULES
+from dissectors.bacnet.told_times import TIME_RULES
 from dissectors.findings import Rule, Severity
 
 _WIRING = "termination and bias at both ends, the shield, and the line's length and stubs"
@@ -280,4 +281,4 @@ _ALL = (
     ),
 )
 
-RULES: dict[str, Rule] = {rule.code: rule for rule in (*_ALL, *CONTENT_RULES, *LENGTH_RULES)}
+RULES: dict[str, Rule] = {rule.code: rule for rule in (*_ALL, *CONTENT_RULES, *LENGTH_RULES, *TIME_RULES)}

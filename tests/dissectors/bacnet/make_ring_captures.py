@@ -347,6 +347,20 @@ def ordered_to_be_silent(order: str = "1901", *, refused: bool = False) -> list[
     return steps
 
 
+def clock(source: int, time: str, *, utc: bool = False) -> bytes:
+    """Tells everybody the time of the last day of 2023; `time`: four octets."""
+    return data(source, 255, f"010010{'09' if utc else '06'}a47b0c1f07b4{time}")
+
+
+def two_clocks() -> list[Step]:
+    """3 and 19 tell the time, and are 85 minutes apart."""
+    steps: list[Step] = []
+    for _ in range(3):
+        steps += [*rounds(3, 3, 12, 19), (2, clock(3, "0c1e0000")), *rounds(1, 3, 12, 19)[:2]]
+        steps += [(2, clock(19, "0b050000")), (2, token(19, 3))]
+    return steps + rounds(3, 3, 12, 19)
+
+
 def each_frame_twice() -> list[Step]:
     """A converter gives back what it hears, behind an adapter that hides how soon; now and then in the next read."""
     steps: list[Step] = []
@@ -438,6 +452,7 @@ MADE = {
     "ms-tp-two-routers-to-one-network": two_ways_to_one_network,
     "ms-tp-token-to-itself-behind-an-adapter": token_to_itself,
     "ms-tp-ordered-to-be-silent": ordered_to_be_silent,
+    "ms-tp-two-clocks": two_clocks,
     "ms-tp-each-frame-twice-behind-an-adapter": each_frame_twice,
     "ms-tp-two-routers-pass-on-from-one-network": two_routers_and_numbers,
     "ms-tp-answers-to-another-address": answers_elsewhere,
