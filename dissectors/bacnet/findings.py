@@ -145,7 +145,18 @@ def _for_others(ring: Ring) -> Iterable[Remark]:
     for (what, mac), happened in ring.happened.items():
         if what is RingEventKind.FOR_ANOTHER:
             seen = f"answered {times(happened.count)} what MAC {listed(happened.parties)} was asked"
+            if mac is not None and len(happened.parties) == 1 and _says_nothing_else(ring, mac, happened.count):
+                seen += (
+                    f"; nothing else is heard of it: it may be MAC {happened.parties[0]} itself, with a wrong source "
+                    "address"
+                )
             yield of("MS306", mac, seen, happened, Severity.NOTE if happened.count < FOR_OTHERS_LEAST else None)
+
+
+def _says_nothing_else(ring: Ring, mac: int, count: int) -> bool:
+    """Whether a station has sent so many frames of data and nothing beside, and nobody gave it a token or asked it."""
+    node = ring.nodes.get(mac, RingNode())
+    return node.data_sent <= count and not (node.is_master or node.tokens_received or node.requests_received)
 
 
 def _least_share(ring: Ring) -> float:

@@ -41,6 +41,18 @@ def test_its_own_answer_may_still_come() -> None:
     assert _requests(read) == [Verdict.ANSWERED] * 6
 
 
+@pytest.mark.parametrize("source", [0, 150])
+def test_who_is_heard_of_nowhere_else_may_be_the_one_that_was_asked(source: int) -> None:
+    """12 answers with a source address that nobody has; 19 of the other bus has tokens, too."""
+    steps = _bus(2, later=False)
+    swapped = [
+        (silence, data(source, 3, octets[8:-2].hex()) if octets[2] == 6 else octets) for silence, octets in steps
+    ]
+    words = "nothing else is heard of it: it may be MAC 12 itself"
+    assert words in script(swapped).of("MS306").seen
+    assert words not in script(steps).of("MS306").seen
+
+
 def test_who_waits_to_the_end_had_no_answer() -> None:
     read = script(_bus(262, later=False))
     assert ("MS301", "3 → 12") in read.graves()
