@@ -7,8 +7,11 @@ from __future__ import annotations
 
 import csv
 import re
+import shutil
 import sys
-from collections.abc import Iterable, Sequence
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import zip_longest
 from typing import cast
 
 from sniff.analysis.sanitizing import sanitized
@@ -16,6 +19,8 @@ from sniff.bus.row_files import safe_text
 from sniff.cli import json_output
 
 Cell = str | int | float | None
+APART, LEAST = 2, 16
+"""Cells between columns, and that a column of text has at least where a table is wider than its terminal."""
 
 
 def write(
@@ -93,13 +98,36 @@ def _write_text(headings: Sequence[str], rows: list[list[str]], bold: Sequence[b
         return
     widths = [max(len(line[column]) for line in [list(headings), *rows]) for column in range(len(headings))]
     numeric = [all(_is_number(row[column]) for row in rows) for column in range(len(headings))]
+    if sys.stdout.isatty():
+        widths = fitting(widths, numeric, shutil.get_terminal_size().columns)
     for at, line in enumerate([list(headings), *rows], -1):
-        cells = [
-            cell.rjust(width) if right else cell.ljust(width)
-            for cell, width, right in zip(line, widths, numeric, strict=True)
-        ]
-        text = "  ".join(cells).rstrip()
-        print(f"\x1b[1m{text}\x1b[0m" if 0 <= at < len(bold) and bold[at] else text)
+        for text in _lines(line, widths, numeric):
+            print(f"\x1b[1m{text}\x1b[0m" if 0 <= at < len(bold) and bold[at] else text)
+
+
+def fitting(widths: Sequence[int], numeric: Sequence[bool], room: int) -> list[int]:
+    """Widths with which a table has `room` cells: its widest columns of text give way; as they are where that is not
+    enough."""
+    room -= APART * (len(widths) - 1)
+    for most in range(max(widths), LEAST - 1, -1):
+        made = [width if right else min(width, most) for width, right in zip(widths, numeric, strict=True)]
+        if sum(made) <= room:
+            return made
+    return list(widths)
+
+
+def _lines(line: Sequence[str], widths: Sequence[int], numeric: Sequence[bool]) -> Iterator[str]:
+    """A row, with what has no room below."""
+    parts = [
+        textwrap.wrap(cell, width) if len(cell) > width else [cell] for cell, width in zip(line, widths, strict=True)
+    ]
+    for cells in zip_longest(*parts, fillvalue=""):
+        placed = zip(cells, widths, numeric, strict=True)
+        yield (
+            (" " * APART)
+            .join(cell.rjust(width) if right else cell.ljust(width) for cell, width, right in placed)
+            .rstrip()
+        )
 
 
 def _is_number(text: str) -> bool:
