@@ -151,7 +151,7 @@ def protocol(name: str) -> str:
 
 
 def duration(text: str) -> float:
-    """argparse type for a duration in seconds: "90", "90s", "5m", "2h", "500ms"."""
+    """argparse type for a duration in seconds: "90", "90s", "5m", "5 min", "2h", "500ms"."""
     seconds = _seconds(text)
     if not seconds:
         raise argparse.ArgumentTypeError(f"duration {text!r}: expected more than nothing")
@@ -163,18 +163,20 @@ def margin(text: str) -> float:
     return _seconds(text)
 
 
-_SECONDS = {"": 1.0, "ms": 0.001, "s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
+_SECONDS = {"": 1.0, "ms": 0.001, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 
 def _seconds(text: str) -> float:
-    number = text.rstrip("smhd")
-    factor = _SECONDS.get(text[len(number) :], 0.0)
+    number = text.rstrip("dhimns ")
+    factor = _SECONDS.get(text[len(number) :].strip(), 0.0)
     try:
         seconds = float(number) * factor if factor else -1.0
     except ValueError:
         seconds = -1.0
     if not 0 <= seconds < 10 * 365 * 86400:
-        raise argparse.ArgumentTypeError(f"duration {text!r}: expected seconds, or a number with ms, s, m, h or d")
+        raise argparse.ArgumentTypeError(
+            f"duration {text!r}: expected seconds, or a number with ms, s, m (min), h or d"
+        )
     return seconds
 
 

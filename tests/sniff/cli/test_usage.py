@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from sniff.cli import arguments
 from tests.sniff.cli.conftest import Ran
 
 CLEAN = Path(__file__).parents[3] / "captures" / "rtu-clean.cap.txt"
@@ -78,3 +80,14 @@ def test_a_table_that_is_not_for_a_protocol_names_those_it_is_for(
     assert (ran.code, ran.out) == (2, "")
     told = ran.err.partition("this table is for ")[2].partition(";")[0]
     assert set(told.strip().split(", ")) == protocols
+
+
+@pytest.mark.parametrize(("text", "seconds"), [("90", 90), ("5m", 300), ("5min", 300), ("1.5 min", 90), ("500ms", 0.5)])
+def test_durations_are_written_as_this_program_writes_them(text: str, seconds: float) -> None:
+    assert arguments.duration(text) == seconds
+
+
+@pytest.mark.parametrize("text", ["", "min", "5n", "5 mins", "5msmin", "nan", "inf", "-5"])
+def test_other_durations_are_refused(text: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError):
+        arguments.duration(text)
