@@ -120,6 +120,12 @@ def _refuse_unknown(word: str, config: Config) -> None:
     device = Path("/dev") / word
     if device.is_char_device():
         raise Failure(f"{word}: no such port or configured bus; did you mean {device}?", USAGE)
+    if re.match("tty|rfcomm", word):  # as ports are named
+        from sniff.sources.ports import list_ports
+
+        there = " ".join(port.device for port in list_ports())
+        said = f"ports here: {there}" if there else "this machine shows no serial ports"
+        raise Failure(f"{word}: no such port; {said}", USAGE)
     if config.path is None:
         looked = f"there is no {FILE} in this folder, in one above it, or in the user's configuration"
     else:

@@ -40,6 +40,14 @@ def test_a_device_without_its_folder(folder: Path, sniff485: Callable) -> None:
     assert "did you mean /dev/null?" in ran.err
 
 
+def test_a_port_without_its_folder_that_is_not_there(
+    folder: Path, sniff485: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sniff.sources.ports.list_ports", list)
+    ran = sniff485("record", "ttyUSB77")
+    assert (ran.code, ran.err) == (2, "sniff485: ttyUSB77: no such port; this machine shows no serial ports\n")
+
+
 @pytest.mark.parametrize("port", ["/dev/ttyUSB7", "COM3", "socket://127.0.0.1:1", "a.mcap"])
 def test_what_may_be_a_port_is_left_to_the_port(folder: Path, port: str) -> None:
     assert target(port).source.spec == port
