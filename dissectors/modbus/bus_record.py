@@ -89,6 +89,8 @@ class BusRecord:
     `crossed`: answers to the request before the newest, which came sooner than a turn takes; by what may follow what.
     `asked_twice`: second answers to requests that were heard twice, one directly behind the other.
     `to_nobody`: reads of address 0, and who answered. `cut_echoes`: requests given back in part.
+    `newest_answer`: row and unit of the newest good one; `behind_answers`: damaged requests directly behind one, by
+    unit.
     `octets`, `frames`: of each sender ("master", "station 3").
     `late_frames`: answers that came too late. `broadcast_answers`: who answered broadcasts. `pairs`: (unit asked, unit
     that answered); `repeated_elsewhere`: repeats of requests that such a pair is about, by unit asked.
@@ -109,6 +111,8 @@ class BusRecord:
     damaged_requests: Tally = field(default_factory=Tally)
     text_damage: TextDamage = field(default_factory=TextDamage)
     carried_over: CarriedOver = field(default_factory=CarriedOver)
+    newest_answer: tuple[int, int] = (0, 0)
+    behind_answers: dict[int, Tally] = field(default_factory=dict)
     strikes: Strikes = field(default_factory=Strikes)  # "master", "station 3" …
     late_speakers: LateSpeakers = field(default_factory=LateSpeakers)
     unasked: Tally = field(default_factory=Tally)
@@ -147,6 +151,13 @@ class BusRecord:
         self.cycles.begin_anew()
         for station in self.stations.values():
             station.last_start = None
+
+    def see_behind(self, time: int, row: int | None) -> None:
+        """A damaged request, in that row, ns: behind whose answer it stands directly; where a late one is due, that may
+        have struck it."""
+        newest, unit = self.newest_answer
+        if newest and row == newest + 1 and time >= self.late_speakers.until:
+            self.behind_answers.setdefault(unit, Tally()).add(time, row)
 
     @property
     def span(self) -> int:

@@ -175,6 +175,7 @@ class ModbusFindings(RequestObserver):
         octets = asked.frame.octets if asked is not None else b""
         self.seen.late_speakers.damaged_request(octets, transaction.start, transaction.request)
         self.seen.damaged_requests.add(transaction.start, transaction.request)
+        self.seen.see_behind(transaction.start, transaction.request)
         if asked is not None:
             self._keep_damaged(asked.frame)
             self.seen.checks_of_requests.see(asked.no, asked.frame.end, ways(asked.frame))
@@ -226,6 +227,7 @@ class ModbusFindings(RequestObserver):
                 return
             self.seen.strikes.struck("master")
             self.seen.damaged_requests.add(transaction.start, transaction.response)
+            self.seen.see_behind(transaction.start, transaction.response)
             return
         self.seen.unasked.add(transaction.start, transaction.response)
         if transaction.station in self.seen.stations:

@@ -128,6 +128,8 @@ class RequestObserver(RowObserver):
             self.seen.damaged_here.add(transaction.start, transaction.request)
         self.seen.strikes.whole()
         self.seen.late_speakers.answered(asked.unit, f"station {asked.unit}", transaction.start)
+        if transaction.response is not None:
+            self.seen.newest_answer = transaction.response, asked.unit
         station.answered += 1
         station.copies += answer == asked.octets
         if transaction.latency is not None and not is_torn:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times, together
 from dissectors.frame import Flaw
-from dissectors.late_speakers import MASTER
+from dissectors.late_speakers import MASTER, is_behind
 from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.damage_shares import DamageShare, shares_of_damage, to_blame
@@ -60,6 +60,22 @@ def judge(seen: BusRecord, timeout: int | None) -> tuple[Finding, ...]:
 
 # ---- the bus
 
+_SPEAKS_BEHIND = (
+    "something speaks behind that station's answers, into what the master sends next: a second, slower device with its "
+    "address, or its own driver; else the request that always comes behind it is sent badly"
+)
+_WHO_SPEAKS_BEHIND = "unplug that station: whether something answers at its address still, and the damage is gone"
+
+
+def _behind_whom(seen: BusRecord, requests: int) -> int | None:
+    """The station behind whose good answers nearly all damaged requests stand, which no chance does; None where there
+    is none. The master itself would damage its requests behind others, too."""
+    damaged = seen.damaged_requests.count
+    for unit, behind in seen.behind_answers.items():
+        if is_behind(behind.count, damaged, seen.stations[unit].answered, requests):
+            return unit
+    return None
+
 
 def _of_bus(seen: BusRecord, is_blamed: bool, scanned: list[int], unheard: list[int]) -> Iterator[Finding]:
     requests = sum(station.asked for station in seen.stations.values()) + seen.damaged_requests.count
@@ -67,9 +83,15 @@ def _of_bus(seen: BusRecord, is_blamed: bool, scanned: list[int], unheard: list[
     count = damaged.count - sum(one.damaged_requests for one in seen.stations.values() if one.has_own_protocol)
     if count > 0:
         words = f"{count} of {counted(requests, 'request')} damaged{seen.when(damaged, requests, count)}"
-        rare = seen.rare(count, requests, damaged)
-        finding = damaged.found(RULES["MB009"], "master", words, note_if(rare or not is_blamed))
-        yield replace(finding, count=count)
+        severity = note_if(seen.rare(count, requests, damaged) or not is_blamed)
+        whose = _behind_whom(seen, requests)
+        made = damaged.found(RULES["MB009"], MASTER if whose is None else "bus", words, severity)
+        if whose is not None:
+            behind = seen.behind_answers[whose].count
+            how_many = "all" if behind == damaged.count else str(behind)
+            words += f", {how_many} of them directly behind an answer of station {whose}"
+            made = replace(made, seen=words, stations=(whose,), means=_SPEAKS_BEHIND, next=_WHO_SPEAKS_BEHIND)
+        yield replace(made, count=count)
     if not damaged.count or seen.damaged_here.count > damaged.count:
         yield from _damaged_here(seen, requests)
     yield from _cut_by_master(seen)

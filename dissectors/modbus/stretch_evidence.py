@@ -18,7 +18,7 @@ from dissectors.modbus.heard import Heard
 from dissectors.modbus.learned_timing import READ
 from dissectors.modbus.limits import ILLEGAL, beyond_limits
 from dissectors.modbus.long_silences import SILENCE_LEAST
-from dissectors.modbus.regular_exchanges import REFUSED, TO_ALL, UNANSWERED
+from dissectors.modbus.regular_exchanges import REFUSED, REPEATED, TO_ALL, UNANSWERED
 from dissectors.modbus.remembered import BEGIN, LAST_STANDARD_UNIT, OPEN_KEPT, SLOW_UNLEARNT, slow_limit
 from dissectors.modbus.response_groups import SameRequest
 from dissectors.modbus.station_record import Key, Requested, StationRecord
@@ -99,12 +99,20 @@ class StretchEvidence:
                 place = behind
         if min(one.became[begin:end]) <= REFUSED:
             self._judge.seen.strikes.whole()
+        self._see_newest(begin, end)
         self._pause_until(one.last[end - 1])
         self._count_all()
         for request in self._compared:
             if request.answers and request.same is not None:
                 request.same.add([one.answered(at) for at in request.same.needed(request.answers)])
                 request.answers.clear()
+
+    def _see_newest(self, begin: int, end: int) -> None:
+        """The newest answer among exchanges [begin, end)."""
+        one = self._exchanged
+        newest = next((at for at in range(end - 1, begin - 1, -1) if one.became[at] <= REPEATED), None)
+        if newest is not None:
+            self._judge.seen.newest_answer = one.rows.first + one.last[newest], one.unit[newest]
 
     def _one_by_one(self, begin: int, end: int) -> None:
         """Take exchanges [begin, end), each as what it is."""

@@ -20,7 +20,7 @@ from dissectors.simulated_faults import (
 )
 from sniff.simulation.tap import EXACT, FTDI
 from tests.faults.buses import modbus, n2
-from tests.faults.case import Case
+from tests.faults.case import Case, Said
 from tests.faults.check_cases import CHECK_CASES
 from tests.faults.drive_cases import DRIVE_CASES
 from tests.faults.hearing import (
@@ -220,6 +220,13 @@ CASES: tuple[Case, ...] = (  # of each a capture is kept in captures/findings
 )
 
 FURTHER_CASES: tuple[Case, ...] = (
+    Case(
+        "RTU slower second device answers into the next request",
+        partial(modbus, (DuplicateAddress("unit 2", 30 * MS),)),
+        (Said(("bus",), words="behind an answer of station 2", own_words=True),),
+        struck=("station 2",),
+        seeds=1,
+    ),
     *CHECK_CASES,
     *MODBUS_CASES,
     *N2_CASES,
