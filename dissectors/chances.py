@@ -49,6 +49,12 @@ def is_by_chance(count: int, of: int, share: float, senders: int) -> bool:
     return senders * at_least(count, of, share) >= (SELDOM_ALONE if count == of else SELDOM)
 
 
+def is_silent_by_chance(asked: int, failed: int, of: int, stations: int) -> bool:
+    """Whether any of so many stations that are there would have no good answer to `asked` requests, now and then, on a
+    bus where those that are heard have none to `failed` of `of`."""
+    return failed > 0 and stations * (failed / of) ** asked >= SELDOM
+
+
 def is_rare(count: int, of: int, span: int, quarters: Mapping[int, int] | None = None) -> bool:
     """Whether so few in `span` ns are not worth a warning: one; or under 1 in 100 and not surely over two a minute.
 

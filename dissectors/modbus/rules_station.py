@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
+from dissectors.chances import is_silent_by_chance
 from dissectors.findings import EVIDENCE_MAX, Finding, Severity, Tally, counted, found, times, together
 from dissectors.frame import Flaw
 from dissectors.late_speakers import reaching
@@ -95,7 +96,11 @@ def of_missing(seen: BusRecord, unit: int, station: StationRecord, is_scanned: b
             words = f"no answer to any of {station.asked} requests"
             stray = station.damaged.count
             words += f"; octets that are no good answer followed {times(stray)}" if stray else ""
-            yield missing.found(RULES["MB001"], name, words)
+            heard = [one for one in seen.stations.values() if not is_absent(one)]
+            failed, of = sum(one.missing.count + one.damaged.count for one in heard), sum(one.asked for one in heard)
+            is_chance = is_silent_by_chance(station.asked, failed, of, len(heard) + 1)
+            words += f"; {failed} of {of} to the others have no good one either" if is_chance else ""
+            yield missing.found(RULES["MB001"], name, words, note_if(is_chance))
         else:
             again = f", sent {times(missing.count)}" if missing.count > 1 else ""
             words = f"no answer to the only request{again}"

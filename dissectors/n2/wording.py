@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from dissectors.chances import at_least, is_rare
+from dissectors.chances import at_least, is_rare, is_silent_by_chance
 from dissectors.findings import Finding, Severity, Tally, counted, times, together
 from dissectors.frame import Flaw
 from dissectors.last_silence import fallen_silent
@@ -277,7 +277,13 @@ def _missing(heard: N2Evidence, name: str, station: N2StationRecord) -> Finding:
         if station.asked <= (TRIES if station.turns <= 1 else 1):  # of another turn nobody knows yet what became
             tries = "the only command" if station.asked == 1 else f"the {station.asked} commands of one turn"
             return tally.found(rule, name, f"no answer to {tries}", Severity.NOTE)
-        return tally.found(rule, name, f"no answer to any of {counted(station.asked, 'command')}", Severity.ERROR)
+        there = [one for one in heard.stations.values() if one.answered or one.late.count]
+        failed = sum(heard.missing(one).count + one.sent.bad.count for one in there)
+        of = sum(one.asked for one in there)
+        is_chance = is_silent_by_chance(station.asked, failed, of, len(there) + 1)
+        seen = f"no answer to any of {counted(station.asked, 'command')}"
+        seen += f"; {failed} of {of} to the others have no good one either" if is_chance else ""
+        return tally.found(rule, name, seen, Severity.NOTE if is_chance else Severity.ERROR)
     finding = tally.found(rule, name, f"no answer to {tally.count} of {counted(station.asked, 'command')}")
     finding = heard.noted_if(heard.is_rare(tally, station.asked), finding)
     is_unheard = heard.unheard(station).count > 0  # then it may be this tap alone that hears nothing of it

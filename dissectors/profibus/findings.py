@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 from dissectors import busiest
+from dissectors.chances import is_silent_by_chance
 from dissectors.findings import Finding, Severity, Tally, counted, times, together
 from dissectors.frame import Event, Frame, Header, Role
 from dissectors.last_silence import fallen_silent
@@ -190,6 +191,11 @@ class ProfibusFindings:
         is_there = record.fresh >= _LEAST_FRESH and silent.count - record.unheard > record.unheard
         grave = Severity.ERROR if is_there else Severity.NOTE
         seen = f"no answer to any of {counted(record.requests, 'request')}{unheard_words(record)}"
+        there = [one for one in self.records.values() if one.answers]
+        failed, of = sum(one.silent + one.damaged.count for one in there), sum(one.requests for one in there)
+        if is_silent_by_chance(record.requests, failed, of, len(there) + 1):
+            grave = Severity.NOTE
+            seen += f"; {failed} of {of} to the others have no good one either"
         if not rubbish:
             return silent.found(RULES["PB001"], who, seen, grave)
         seen += f"; to {rubbish} of them came octets that are no telegram"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dissectors.chances import MINUTE, at_least, is_by_chance, is_rare
+from dissectors.chances import MINUTE, at_least, is_by_chance, is_rare, is_silent_by_chance
 
 LONG = 1_000_000
 
@@ -67,3 +67,11 @@ def test_of_many_senders_one_is_always_struck_most() -> None:
     assert is_by_chance(2, 2, 0.1, 10)
     assert not is_by_chance(3, 3, 0.1, 10)  # nobody else is struck at all
     assert is_by_chance(3, 3, 0.1, 100)
+
+
+def test_who_is_asked_seldom_where_most_fails_may_be_there() -> None:
+    assert is_silent_by_chance(7, 53, 90, 16)
+    assert not is_silent_by_chance(20, 53, 90, 16)
+    assert not is_silent_by_chance(2, 0, 90, 16)
+    assert not is_silent_by_chance(2, 0, 0, 1)  # nobody else is heard
+    assert not is_silent_by_chance(7, 5, 90, 16)

@@ -53,6 +53,7 @@ from tests.faults.stations import (
     Resets,
 )
 from tests.faults.uneven_stations import TakesTurns, Waits
+from tests.faults.workbench import Modbus, usual_requests, usual_stations
 
 MS = 1_000_000
 S = 1_000_000_000
@@ -62,6 +63,7 @@ S = 1_000_000_000
 
 _ascii = partial(modbus, is_ascii=True)
 _wrong_place = {2: partial(AnswersAs, unit=7)}
+_FOUR = (1, 2, 3, 4)
 _some_lost = LostResponse(0.04, ("unit 3",))
 _short_answers = {2: partial(AnswersAs, drop=2)}
 
@@ -225,6 +227,15 @@ FURTHER_CASES: tuple[Case, ...] = (
         partial(modbus, (DuplicateAddress("unit 2", 30 * MS),)),
         (Said(("bus",), words="behind an answer of station 2", own_words=True),),
         struck=("station 2",),
+        seeds=1,
+    ),
+    Case(
+        "RTU seldom asked station on a line that damages half",
+        Modbus(
+            (*4 * usual_requests((1, 2, 3, 4)), read_holding(9, 0, 6)), usual_stations((1, 2, 3, 4)), (BitFlips(0.03),)
+        ),
+        (("MB007", "bus"),),
+        seconds=10,
         seeds=1,
     ),
     *CHECK_CASES,
