@@ -40,6 +40,9 @@ MODULES = ("sniff", "pytest")
 READ_AT_START = ("PYTHON", "LC_", "LANG", "TZ", "LD_", "MALLOC")
 """How names of variables begin that an interpreter and its libraries read once."""
 
+_AT_START = dict(os.environ)
+"""What the warm process reads, whatever a test has set meanwhile."""
+
 _HEAD = struct.Struct("!I")
 _USED = (
     *(f"sniff.cli.{name}" for name in ("box", "check", "demo", "detect", "extcap", "live", "points", "record", "show")),
@@ -122,7 +125,7 @@ def _may_be_forked(args: Any, environment: Mapping[str, str] | None) -> bool:
         return False
     if not hasattr(os, "fork"):
         return False
-    return environment is None or _read_at_start(environment) == _read_at_start(os.environ)
+    return _read_at_start(os.environ if environment is None else environment) == _read_at_start(_AT_START)
 
 
 def _read_at_start(environment: Mapping[str, str]) -> dict[str, str]:
@@ -139,7 +142,7 @@ def _warm() -> socket.socket:
     with theirs:
         process = subprocess.Popen(
             [sys.executable, "-m", "tests.e2e.warm_start", str(theirs.fileno())],
-            cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)}, pass_fds=[theirs.fileno()],
+            cwd=ROOT, env={**_AT_START, "PYTHONPATH": str(ROOT)}, pass_fds=[theirs.fileno()],
             stdin=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip
 
