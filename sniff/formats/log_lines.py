@@ -6,12 +6,12 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from functools import lru_cache
 
 from dissectors.checksums import ends_with_crc16
 from dissectors.quick_values import quickly_made
 from sniff.formats.log_clock import Stamp, stamp_of
 from sniff.formats.log_groups import groups_in, unpadded_in
+from sniff.formats.log_memory import remembered
 from sniff.formats.log_octets import PAIRS_ONLY, Run, number_in, numbers_in, octets_in, whole_in
 from sniff.formats.log_pieces import LONGEST, SPACES
 from sniff.formats.log_shapes import COLOURS, REMARK, STAMP, WAYS, Role, shape_of
@@ -20,10 +20,6 @@ from sniff.formats.log_times import AS_WRITTEN, Times
 MOST_MORE = 512
 """Reads that one line tells."""
 _BETWEEN = 60
-
-REMEMBERED, LONGEST_REMEMBERED = 4096, 512
-"""Lines, and characters of one, whose taking apart is remembered: the plan of a log, its clock and its reading look at
-the same first lines, each anew."""
 
 MOST_STAMPS = 3
 """Times in a line that are taken out of it; a program's log around another's has two."""
@@ -100,10 +96,10 @@ def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True, times: Times =
     """A line taken apart. `base`, `least`: of numbers, of digits (`octets_in`); `rows`: whether an offset may stand
     before octets; `times`: how its times are read.
     """
-    take_apart = _remembered if len(text) <= LONGEST_REMEMBERED else _taken_apart
-    return take_apart(text, base, rows, times, least)
+    return _taken_apart(text, base, rows, times, least)
 
 
+@remembered
 def _taken_apart(text: str, base: int, rows: bool, times: Times, least: int) -> Line:
     text = SPACES.sub("   ", COLOURS.sub("", text))[:LONGEST].rstrip()
     if not text.strip():
@@ -155,7 +151,6 @@ def _taken_apart(text: str, base: int, rows: bool, times: Times, least: int) -> 
 
 
 _TELLING = (Role.DATA, Role.PERHAPS)
-_remembered = lru_cache(REMEMBERED)(_taken_apart)
 
 
 def numbers_of(text: str) -> tuple[str, ...]:
@@ -284,6 +279,7 @@ _HEX = frozenset("0123456789ABCDEFabcdef")
 _JOINED = re.compile(r"(?:^|[\s:>=\]])(?=[0-9A-Za-z?]*[0-9A-Fa-f]{4})(?=(?:[A-Za-z?]*\d){4})([0-9A-Za-z?]{10,})\s*$")
 
 
+@remembered
 def without_stamps(text: str, times: Times = AS_WRITTEN, most: int = MOST_STAMPS) -> tuple[Stamp | None, str]:
     """The first time of a line, None without one; and the line with STAMP where times were, `most` of them."""
     first: Stamp | None = None

@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass, replace
 
 from dissectors.checksums import ends_with_crc16
+from sniff.formats.log_memory import remembered
 from sniff.formats.log_shapes import STAMP, WAYS
 from sniff.formats.log_spellings import H2, SPELLINGS, SURELY
 
@@ -45,6 +46,7 @@ _WORDS = re.compile(
 _TOKEN = re.compile(r"[0-9A-Fa-f]{1,3}")
 
 
+@remembered
 def octets_in(line: str, base: int = PAIRS_ONLY, least: int = 0) -> Run | None:
     """The octets that a line tells, None when it tells none. `base`: of runs of numbers; PAIRS_ONLY where only pairs of
     hexadecimal digits count. `least`: digits without space that are believed, 0: as many as where they stand asks for.

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from dissectors.checksums import crc16_modbus
+from sniff.formats.log_memory import remembered
 
 STAMP = "\0"
 """Stands in a line where a time was."""
@@ -201,6 +202,7 @@ COLOURS = re.compile(r"\x1b(?:\[[0-9;?]*[A-Za-z]|\][^\x07\x1b]{0,400}(?:\x07|\x1
 REMARK = ("#", ";", "//")
 
 
+@remembered
 def shape_of(line: str) -> tuple[Shape, re.Match[str]] | None:
     """The known shape of a line and where it was found."""
     for shape in SHAPES:
