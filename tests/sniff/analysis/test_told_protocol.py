@@ -28,6 +28,7 @@ def _files() -> list[Path]:
         for folder in FOLDERS
         for path in folder.rglob("*")
         if "-read-as-" not in path.name  # of those the header is what is wrong
+        and "-of-a-network" not in path.name  # which carries frames of another protocol on a line of serial ones
         and path.name.endswith((".cap.txt", ".pcap", ".cap", ".mcap", ".pcapng"))
         and path.name.endswith(suffixes())
     )
