@@ -110,9 +110,9 @@ class Assembly:
 
     def _head(self, line: Line) -> None:
         """A line that says something of the octets below; two of them may stand above one another."""
-        before = self._heading
-        if before is not None and line.stamp is None and before.stamp is not None and not self._used:
-            line = replace(line, stamp=before.stamp)
+        before = self._heading.stamp if self._heading is not None and not self._used else None
+        if before is not None and (line.stamp is None or (before.dated and not line.stamp.dated)):
+            line = replace(line, stamp=before)
         self._heading, self._used = line, False
 
     def close(self) -> Iterator[Item]:

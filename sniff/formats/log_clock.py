@@ -17,7 +17,8 @@ from sniff.formats.table_cells import MOST, UNITS, seconds
 _TIME = (
     r"(?:(?P<ahead>[AaPp]\.?[Mm]\.?|上午|下午|오전|오후) ?)?"
     r"(?P<clock>\d{1,2}:\d{2}:\d{2}"
-    r"(?:[.,]\d{1,9}(?!\d|[A-Fa-f](?![Mm]\b)|(?<=,\d\d)\.\d|(?<=,\d)\.\d)|:\d{3}(?![\d:]))?)"  # not ,01CB or ,21.5
+    r"(?:[.,]\d{3},\d{3}(?=[\]\s])"
+    r"|[.,]\d{1,9}(?!\d|[A-Fa-f](?![Mm]\b)|(?<=,\d\d)\.\d|(?<=,\d)\.\d)|:\d{3}(?![\d:]))?)"  # not ,01CB or ,21.5
     r"(?!\d|:[0-9A-Za-z])(?:[ \u00a0\u202f]?(?P<half>[AaPp](?:[Mm]\b|\. ?[Mm]\.)))?"
 )
 _MONTHS = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
@@ -93,13 +94,19 @@ def _is_leap_day(found: Mapping[str, str | None]) -> bool:
 
 def _of_day(match: re.Match[str], _order: Order | None = None) -> int:
     """ns since midnight."""
-    hours, minutes, *rest = match["clock"].replace(",", ".").split(":")
+    hours, minutes, *rest = _parts_joined(match["clock"]).split(":")
     hour = int(hours)
     found = match.groupdict()
     half = (found.get("half") or found.get("ahead") or "").lower()
     if half:
         hour = hour % 12 + (12 if half[0] in "p下" or half == "오후" else 0)
     return (hour * 60 + int(minutes)) * 60 * NS_PER_S + seconds(".".join(rest))
+
+
+def _parts_joined(clock: str) -> str:
+    """A time of day with a point before the parts of its second: `1:02:03,456,789` has them in two groups."""
+    whole, _, parts = clock.replace(",", ".").partition(".")
+    return f"{whole}.{parts.replace('.', '')}" if parts else whole
 
 
 def _days(match: re.Match[str], _order: Order | None = None) -> int:
@@ -222,13 +229,13 @@ _HEAD = 160
 """Characters at the begin of a line in which a time is looked for."""
 _TAIL = 80
 _ONLY_BRACKETS = re.compile(
-    r"(?:\s*\d{1,7}\s+|[A-Z][a-z]{2}\(\d+\):|[a-z]\w*-\d{1,3}:)?[\s\[({<#*|+]*(?:\[?[A-Z]\]?[ ]?)?"
+    r"(?:\s*\d{1,7}\s+|\[pid +\d+\]|[A-Z][a-z]{2}\(\d+\):|[a-z]\w*-\d{1,3}:)?[\s\[({<#*|+]*(?:\[?[A-Z]\]?[ ]?)?"
 )
 
 
 def stamp_of(line: str, times: Times = AS_WRITTEN) -> Stamp | None:
     """The time in a line, None when there is none."""
-    head = line[:_HEAD]
+    head = line[:_HEAD].replace("\t", " ")
     if times.unit and (bare := BARE.match(head)) is not None:
         text = bare["number"].replace(",", ".")
         tick = max(1, times.unit // 10 ** len(text.partition(".")[2]))
@@ -305,7 +312,7 @@ def _tick(match: re.Match[str], counted: int = 0) -> int:
         )
     elif text.count(":") == 3:
         return MS
-    _, _, decimals = text.replace(",", ".").partition(".")
+    _, _, decimals = _parts_joined(text).partition(".")
     tick: int = unit // 10 ** len(decimals)
     return max(1, tick)
 

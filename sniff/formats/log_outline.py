@@ -15,7 +15,7 @@ from sniff.formats.log_lines import Kind, Line, key_of, label_of, way_of, withou
 from sniff.formats.log_octets import octets_in
 from sniff.formats.log_pieces import LONGEST, SPACES
 from sniff.formats.log_shapes import COLOURS, STAMP, WAYS, Role
-from sniff.formats.log_spellings import CHARACTERS, ENDS, H2, NUMBERED, SHOWN, ended, numbered_characters
+from sniff.formats.log_spellings import CHARACTERS, ENDS, H2, SPELLINGS, ended
 from sniff.formats.log_times import Times
 
 LEAST = 2
@@ -26,17 +26,12 @@ _CHARACTERS = "\1"
 
 _SHORT = {
     "pairs": re.compile(rf"(?<![0-9A-Za-z_.]){H2}(?:[ :.-]{H2}){{0,2}}(?![0-9A-Za-z_])"),
-    "digits without space": re.compile(rf"(?<![0-9A-Za-z_])(?:{H2}){{1,5}}(?![0-9A-Za-z_])"),
-    "0x and digits": re.compile(r"(?<![0-9A-Za-z_])0[xX][0-9A-Fa-f]{1,2}(?![0-9A-Za-z_])"),
-    "pairs in brackets": re.compile(rf"\[{H2}\]|<{H2}>|\({H2}\)|\{{{H2}\}}"),
-    "digits and h": re.compile(rf"(?<![0-9A-Za-z_]){H2}[hH](?![0-9A-Za-z_])"),
-    "digits after a sign": re.compile(r"(?<![0-9A-Za-z_])(?:&H[0-9A-Fa-f]{1,2}|[$%&#][0-9A-Fa-f]{2})(?![0-9A-Za-z_])"),
-    "digits behind 16#": re.compile(r"(?<![0-9A-Za-z_#])16#[0-9A-Fa-f]{1,2}(?![0-9A-Za-z_])"),
-    NUMBERED: re.compile(rf"(?:(?<=\s)|^)(?:{SHOWN}) \((?:\d{{3}}|[0-9a-f]{{2}})\)"),
+    "digits without space": re.compile(rf"(?:(?<![0-9A-Za-z_])|(?<=0[xX]))(?:{H2}){{1,5}}(?![0-9A-Za-z_])"),
     CHARACTERS: re.compile(rf"(?<![0-9A-Za-z_])(?:[:>][0-9A-F]+|[AN][0-9A-F]*){ENDS}(?![0-9A-Za-z_])"),
-}
+} | {one.name: one.short_pattern() for one in SPELLINGS if one.between is not None}
 """Spelling → octets of a line that has few."""
-_SIGNED = frozenset(("0x and digits", "pairs in brackets", CHARACTERS))
+_DECODED = {one.name: one.decode for one in SPELLINGS if one.between is not None}
+_SIGNED = frozenset((*_DECODED, CHARACTERS)) - {"pairs joined by _"}
 """Spellings that are octets wherever they stand."""
 _DECIMAL = re.compile(r"(?<![0-9A-Za-z_.])\d{1,3}(?![0-9A-Za-z_])")
 _NUMERAL = re.compile(r"0[xX][0-9A-Fa-f]+|\d+")
@@ -123,10 +118,12 @@ def _octets(text: str, spelling: str) -> bytes:
         return ended(text)
     if spelling.startswith("numbers"):
         return bytes((int(text),)) if int(text) < 256 else b""
-    if spelling == NUMBERED:
-        return numbered_characters(text)
-    digits = re.sub(r"0[xX]|16#|[^0-9A-Fa-f]", "", text)
-    return bytes.fromhex(digits if len(digits) % 2 == 0 else f"0{digits}")
+    if spelling in _DECODED:
+        try:
+            return _DECODED[spelling](text)
+        except ValueError:
+            return b""
+    return bytes.fromhex(re.sub(r"[^0-9A-Fa-f]", "", text))
 
 
 def _outline(spelling: str, text: str, begin: int, end: int, octets: bytes) -> Outline:

@@ -47,6 +47,7 @@ _MOSTLY = 0.8
 _TELLING = 3
 _NO_WORD = 64  # octets of one line that stands alone under a letter
 _BACK = 0.2
+_NAMES_LEAST = 6
 _FIXED_LEAST = 3  # lines of one width, before they are taken for the width of a table
 _WIDTHS = (8, 10, 12, 16, 20, 24, 32, 40, 48, 64)
 
@@ -108,9 +109,9 @@ class Plan:
         return line
 
     def _may_be_short(self, line: Line) -> bool:
-        """Whether a line has no octets of its own, or one, of which its label says nothing."""
+        """Whether a line has no octets of its own, or few, of which its label says nothing."""
         if line.kind is Kind.OCTETS:
-            return line.spelling == "one octet" and not line.tool and self.roles.get(line.family) is not Role.DATA
+            return len(line.octets) < _TELLING and not line.tool and self.roles.get(line.family) is not Role.DATA
         return line.kind in (Kind.TEXT, Kind.STRANGE) or line.role is Role.HEADING
 
     def role(self, line: Line, recent: bytes) -> Role | None:
@@ -202,10 +203,18 @@ def _steps(lines: Sequence[Line], times: Times) -> Times:
         return times
     changes = [later.time - earlier.time for earlier, later in pairwise(stamps) if later.time != earlier.time]
     back = sum(change < 0 for change in changes) > _BACK * len(changes)
+    if back and _are_names([stamp.time for stamp in stamps]):
+        return replace(times, clocks_only=True)
     passed = sum(stamp.time for stamp in stamps[1:]) if back else stamps[-1].time - stamps[0].time
     if 4 * passed < FASTEST * sum(len(line.octets) for line in told[1:]):
         return replace(times, clocks_only=True)  # how long a call took: octets take their time on the line
     return replace(times, steps=True) if back else times
+
+
+def _are_names(times: Sequence[int]) -> bool:
+    """Whether numbers are those of devices or lines, and not measured: two alone, and near one another, while an answer
+    comes sooner than the next request."""
+    return len(times) > _NAMES_LEAST and len(set(times)) <= 2 and 2 * max(times) < 3 * min(times)
 
 
 def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:

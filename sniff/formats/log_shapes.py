@@ -191,7 +191,7 @@ WAYS = re.compile(
     r"(?<![A-Za-z0-9_<>=-])(?:>>>|<<<|>>|<<|-->|<--|==>|<==|->|<-|=>|<=|>|<(?![A-Za-z_/]\w*>)|→|←)(?![<>=-])"
     r"|(?<![A-Za-z])(?:tx[d]?|rx[d]?|sen(?:d|ds|t|ding)|transmit(?:s|ted|ting)?|recv|rcv[d]?|receiv(?:e[d]?|ing)|writ(?:e|ing|ten)|wrote|read|"
     r"in|out|input|output|incoming|outgoing|request|response|req|re?sp|query|answer|reply|to|from|"
-    r"master|slave|host|device|dte|dce|c1|c2|poll)(?![A-Za-z])",
+    r"master|slave|host|device|dte|dce|(?<!\d)c[12](?!\d)|poll)(?![A-Za-z])",
     re.IGNORECASE,
 )
 """How tools say which way octets went."""

@@ -69,9 +69,14 @@ class Spelling:
 
     def pattern(self) -> re.Pattern[str]:
         """A run of such octets in a line."""
-        run = self.token
-        if self.between is not None:
-            run += rf"(?:{self.between}{self.token}){{{self.least - 1},}}"
+        return self._run(f"{self.least - 1},")
+
+    def short_pattern(self) -> re.Pattern[str]:
+        """A run of fewer than would be believed."""
+        return self._run(f"0,{max(0, self.least - 2)}")
+
+    def _run(self, more: str) -> re.Pattern[str]:
+        run = self.token if self.between is None else rf"{self.token}(?:{self.between}{self.token}){{{more}}}"
         return re.compile(f"{self.before}(?:{run}){self.after}")
 
 
@@ -135,6 +140,13 @@ def ended(text: str) -> bytes:
     """A frame written as its characters, with what ends it."""
     body = _END.sub("", text)
     return body.encode() + (b"\r\n" if body[0] == ":" else b"\r")
+
+
+def _strings(text: str) -> bytes:
+    """Strings of a character each, as a list of them is printed."""
+    if "\\" not in text:
+        raise ValueError("letters")
+    return b"".join(_escaped(one) for one in re.findall(_STRING_OF_ONE, text))
 
 
 def _signed(text: str) -> bytes:
@@ -201,12 +213,16 @@ SHOWN = r"<[A-Z0-9]{2,5}>|\S"
 _CONTROL = rf"<(?:{'|'.join(_NAMED)})>"
 _HEX = _by(H2, 16)
 
+_STRING_OF_ONE = rf"b?(?:'(?:\\x{H2}|\\.|[^\\'])'|\"(?:\\x{H2}|\\.|[^\\\"])\")"
+
 ESCAPED_STRING = r"(?P<q>['\"])(?=(?:(?!(?P=q))[^\\]|\\[\\'\"]){0,400}\\[x0-7abtnvfr])"
 """How a string in quotes begins that has escapes in it."""
 
 SPELLINGS: tuple[Spelling, ...] = (
     Spelling(CHARACTERS, rf"(?::(?:[0-9A-F]{{2}}){{3,260}}|>[0-9A-F]{{4,260}}){ENDS}", None,
              _frame_of_characters, 1, before=r"(?<![0-9A-Za-z_#.>])"),
+    Spelling("strings of a character", _STRING_OF_ONE, ", ?", _strings, 2, before=r"(?<![0-9A-Za-z_])", after=""),
+    Spelling("pairs in quotes", rf"(?:'{H2}'|\"{H2}\")", ", ?", _HEX, SURELY, before="", after=""),
     Spelling("byte strings", rf"(?:b|bytearray\(b)?{ESCAPED_STRING}(?:(?!(?P=q))[^\\]|\\.)*(?P=q)", None, _escaped, 1,
              before=r"(?<![0-9A-Za-z_])", after=""),
     Spelling("escapes", _ESCAPES, r"[ ,]?", _escapes_alone, 2, before=""),
@@ -231,7 +247,7 @@ SPELLINGS: tuple[Spelling, ...] = (
     Spelling("three decimals in brackets", r"\[\d{3}\]", r"[ ,]?", _by(r"\[(\d{3})\]", 10), 3, before="", after=""),
     Spelling("digits behind 16#", r"(?:[BW]#)?16#[0-9A-Fa-f]{1,2}", r"[ ]?[,;]?[ ]?",
              _by(r"16#([0-9A-Fa-f]{1,2})", 16), 2),
-    Spelling("digits and h", rf"{H2}[hH]", _SEPARATOR, _by(rf"({H2})[hH]", 16), 2),
+    Spelling("digits and h", rf"0?{H2}[hH]", _SEPARATOR, _by(rf"({H2})[hH]", 16), 2),
     Spelling("character codes", r"#\d{1,3}", "", _codes, SURELY, before=r"(?<![0-9A-Za-z_])"),
     Spelling("digits after a sign", rf"(?:&H[0-9A-Fa-f]{{1,2}}|[$%&#]{H2})", r"[ ,;]{0,2}",
              _by(r"[H$%&#]([0-9A-Fa-f]{1,2})", 16), 2, before=r"(?<![0-9A-Za-z_])"),

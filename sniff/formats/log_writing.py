@@ -14,6 +14,7 @@ together, then done with each line. Pure.
     a string a character            [RX:'\\x11'] [RX:'k']  →  RX '\\x11\\x6b'
     rows of numbers (`dump_rows.py`)  0000000 021 003  \\0   k  →  0000000  11 03 00 6b
     groups of eight, with signs     43 40 - 49 ad  →  43 40 49 ad; the ruler above them  →  nothing
+    the check in a column           01 03 00 | C4 0B  →  01 03 00 C4 0B
     annotations of sigrok           uart-1: 247, 367, 11110111, [F7], k  →  uart-1: F7
     base 64                         EQMAawADdoc=  →  11 03 00 6b 00 03 76 87
 """
@@ -64,6 +65,8 @@ class Writing:
     """How octets are written that a decoder of sigrok tells (`_ANNOTATED`), "" in pairs."""
     mixed: bool = False
     """Whether characters that can be shown stand among escapes, without quotes around."""
+    checks: bool = False
+    """Whether behind octets and a sign stands their check, one octet or two."""
 
     def rewritten(self, text: str) -> str:
         """A line with its octets side by side."""
@@ -73,6 +76,8 @@ class Writing:
             return ""
         if "  " in text or "-" in text:
             text = _EIGHT.sub(_together, text)
+        if self.checks:
+            text = _CHECK.sub(r"\g<octets> ", text)
         if self.annotations:
             return _annotated(text, self.annotations)
         if self.base64:
@@ -113,6 +118,7 @@ def writing_of(texts: Sequence[str]) -> Writing:
         _is_base64(texts),
         _annotations_of(texts),
         sum(any(map(_is_mixed, _MIXED.finditer(text))) for text in slashed if not _QUOTED.search(text)) >= _LEAST,
+        _have_checks(texts),
     )
 
 
@@ -198,6 +204,18 @@ _PAIR_BEHIND = re.compile(r" {1,8}(?=[0-9]?[A-Fa-f])[0-9A-Fa-f]{2}(?![0-9A-Za-z]
 
 
 _H = "[0-9A-Fa-f]{2}"
+_PAIRS = re.compile(rf"(?<![0-9A-Za-z.:]){_H}(?: {_H})+(?![0-9A-Za-z])")
+_CHECK = re.compile(rf"(?P<octets>(?<![0-9A-Za-z.:]){_H}(?: {_H})*) ?[|/] ?(?={_H}(?: {_H})?\s*$)")
+_NEARLY_ALL, _CHECKS_LEAST = 0.9, 4
+
+
+def _have_checks(texts: Sequence[str]) -> bool:
+    """Whether nearly every line with octets has one or two more behind a sign: no column of characters is so."""
+    lines = [text for text in texts if _PAIRS.search(text) is not None]
+    checks = [text for text in lines if _CHECK.search(text) is not None]
+    return len(checks) >= _CHECKS_LEAST and len(checks) >= _NEARLY_ALL * len(lines)
+
+
 _RULER = re.compile(
     r"(?:[\s|]*|\s*offset\W+)(?:0?0[ ]+0?1[ ]+0?2[ ]+0?3[ ]+0?4[ ]+0?5[ ]+0?6[ ]+0?7)"
     r"(?=[\s|-]*(?:$|0?8 |[^\s0-9A-Za-z]))",

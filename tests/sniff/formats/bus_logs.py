@@ -432,6 +432,23 @@ add(
     1e-5,
 )
 
+add("tabs-within-the-time", lines(lambda s: f"{s.time:%d.%m.%Y}\t{clock(s, 3, ',')}\t{tx(s)}\t{hx(s.octets)}"), 0.002)
+add(
+    "parts-in-two-groups",
+    lines(lambda s: f"[{clock(s)},{s.time.microsecond % 1000:03d}] <dbg> uart: {tx(s)} {hx(s.octets)}"),
+    1e-5,
+)
+add("thread-of-a-trace", lines(lambda s: f"[pid  {80 + s.asks}] {s.epoch / NS:.6f} {tx(s)} {hx(s.octets)}"), 1e-5)
+add(
+    "export-of-a-journal",
+    lines(
+        lambda s: (
+            f"__REALTIME_TIMESTAMP={s.epoch // 1000}\n__MONOTONIC_TIMESTAMP={round(s.at * 1e6)}\n_PID=81\nMESSAGE={tx(s)}: {hx(s.octets)}\n"
+        )
+    ),
+    1e-5,
+)
+
 
 # -- packets ------------------------------------------------------------------------------------------------------
 

@@ -69,6 +69,13 @@ KINDS: dict[str, Written] = {
     "16#": lambda i, o: f"{way(i)}: {hx(o, ', ', '16#{:02X}')}\n",
     "characters with numbers": lambda i, o: f"Host --> {' '.join(map(numbered, o))} \n",
     "sum behind": lambda i, o: f"DATE=2026-03-14T10:00:{i:02d}.512;FRAME={hx(o, '-')};CRC=OK;CRC_VAL=0x{sum(o):04X};\n",
+    "pairs in quotes": lambda i, o: f"10:00:{i:02d}.512 MB: {{'RawData':{[f'{one:02X}' for one in o]}}}\n",
+    "strings of a character": lambda i, o: f"10:00:{i:02d}.512 {[bytes((octet,)) for octet in o]}\n",
+    "assembler": lambda i, o: f"10:00:{i:02d}.512 {way(i)} {', '.join('0' * (one > 0x9F) + f'{one:02X}h' for one in o)}\n",
+    "decimals in brackets": lambda i, o: hx(o, "", "[{:03d}]") + "\n",
+    "data of a phone": lambda i, o: f"10:00:{i:02d}.512 app {{length = {len(o)}, bytes = 0x{o.hex()}}}\n",
+    "a check in a column": lambda i, o: f"10:00:{i:02d}.512 {way(i)} {f'{hx(o[:-1])} | {hx(o[-1:])}'.strip(' |')}\n",
+    "ticks with c1 in them": lambda i, o: f"0x002{'C1F'[i % 3:]}{i:04X} {way(i)} {hx(o)}\n",
     "decimals on lines": lambda i, o: f'{{"t": {i}, "data": [\n' + ",\n".join(f" {octet}" for octet in o) + "\n]}\n",
 }  # fmt: skip
 
