@@ -183,7 +183,7 @@ def run(steps: Iterable[Step]) -> Output:
 
 def save(path: Path, steps: Sequence[Step]) -> None:
     """The steps as a capture file; its suffix says which."""
-    with create(path, SESSION, None) as writer:
+    with create(path, SESSION) as writer:
         for chunk in chunks(steps):
             writer.write(chunk)
 

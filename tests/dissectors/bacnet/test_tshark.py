@@ -118,7 +118,7 @@ def readings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[S
 
 def _write(path: Path, samples: list[Sample]) -> None:
     session = Session("bus", LineSettings(115200), "mstp", 10**18)
-    with create(path, session, None) as writer:
+    with create(path, session) as writer:
         for number, sample in enumerate(samples):
             writer.write(Chunk(10**18 + number * 10**9, sample.octets))
 

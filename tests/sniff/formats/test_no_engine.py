@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 FORMATS = Path(__file__).parents[3] / "sniff" / "formats"
-VALUES = {"blocks", "capture", "capture_error", "read_times", "session"}
+VALUES = {"blocks", "capture", "capture_error", "event_texts", "read_times", "session"}
 """Modules of `sniff.engine` that hold values only."""
 
 
