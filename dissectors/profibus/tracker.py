@@ -63,7 +63,8 @@ class ProfibusTracker:
     """The tracker of one bus."""
 
     def __init__(self, timing: Timing) -> None:
-        self._patience, self._syn = PATIENCE + timing.latency, timing.line.bits(SYN)
+        self._patience = PATIENCE + timing.latency
+        self._syn = timing.line.bits(SYN) if timing.has_times else 0  # without times nothing is sure to come at once
         self._tx = 0
         self._open: _Asked | None = None
         self._past: _Asked | None = None  # the last request, once it is closed

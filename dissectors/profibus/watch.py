@@ -121,7 +121,8 @@ class BusWatch:
         self._heard = self._slack = 0  # end of the row before, and by how much it may have been earlier
         self._timing = timing
         self._least_claim = timing.line.bits(_LEAST_CLAIM)
-        self._slot, self._syn = timing.line.bits(LONGEST_SLOT), timing.line.bits(SYN)
+        self._slot = timing.line.bits(LONGEST_SLOT)
+        self._syn = timing.line.bits(SYN) if timing.has_times else 0  # without times nothing is sure to come at once
         self._holder: int | None = None
         self._interruption: _Interruption | None = None  # until it is known whether a token was missed at this tap
         self._robbed: int | None = None  # who lost the token to another one that gave it up; until it speaks in turn
