@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Severity, Tally, counted
 from dissectors.line import MS
-from dissectors.tracker import Transaction, Verdict
+from dissectors.tracker import Passing, Transaction, Verdict
 from sniff.analysis.line_rules import LINE_RULES as RULES
 
 if TYPE_CHECKING:
@@ -35,14 +35,18 @@ class EchoesHeard:
         self._echoes = Tally()
         self._copies = 0  # of them those of answers
         self._asked = self._answered = 0
+        self._tokens = 0  # of what asked
+        self._tokens_return = False  # whether a protocol tells copies of them as echoes
         self._pending: dict[int, None] = {}  # requests with an echo that are still open, by transaction
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
         if transaction.verdict is Verdict.ECHO:
             self._add(transaction.start, transaction.request, transaction.response, transaction.of)
+            self._tokens_return |= transaction.kind == Passing.TOKEN
         elif transaction.request is not None:
-            self._asked += transaction.verdict is not Verdict.DATA  # a token is no request
+            self._asked += 1
+            self._tokens += transaction.kind == Passing.TOKEN
             self._close(transaction.id, transaction.verdict in _ANSWERED)
 
     def settle_many(self, closed: TransactionColumns) -> None:
@@ -53,7 +57,10 @@ class EchoesHeard:
 
         is_echo = closed.verdict == VERDICTS.index(Verdict.ECHO)
         asks = (closed.request != NONE) & ~is_echo
-        self._asked += int((asks & (closed.verdict != VERDICTS.index(Verdict.DATA))).sum())
+        is_token = np.array([name == Passing.TOKEN for name in closed.names])[closed.kind]
+        self._asked += int(asks.sum())
+        self._tokens += int((asks & is_token).sum())
+        self._tokens_return |= bool((is_echo & is_token).any())
         if not self._pending and not is_echo.any():
             return
         is_answered = np.isin(closed.verdict, [VERDICTS.index(one) for one in _ANSWERED])
@@ -67,16 +74,17 @@ class EchoesHeard:
     def found(self) -> Finding | None:
         """What there is to say of them."""
         count = self._echoes.count - self._copies
+        asked = self._asked if self._tokens_return else self._asked - self._tokens
         if not self._echoes.count:
             return None
-        words = f"{count} of {counted(self._asked, 'request')} came twice, the copy directly behind"
-        if count > self._asked:  # several copies of one, or of some that are still open
+        words = f"{count} of {counted(asked, 'request')} came twice, the copy directly behind"
+        if count > asked:  # several copies of one, or of some that are still open
             words = f"{counted(count, 'request')} came directly behind the same request"
         if self._copies:
             answers = f"{counted(self._copies, 'answer')} came twice"
             words = f"{words}; {answers}" if count else f"{answers}, the copy directly behind"
         is_told = self._is_timed or self._answered >= ECHOES_LEAST
-        often = (most := max(count, self._copies)) >= ECHOES_LEAST and 2 * most >= self._asked
+        often = (most := max(count, self._copies)) >= ECHOES_LEAST and 2 * most >= asked
         if not is_told:
             words += "; how soon, is not known, and a master that repeats would look the same"
         return self._echoes.found(RULES["LN205"], "bus", words, Severity.WARNING if often and is_told else None)
