@@ -25,7 +25,7 @@ from sniff.engine.session import LineEvent, LineEventKind, Session
 
 if TYPE_CHECKING:
     from dissectors.columns import Masks, TransactionColumns
-    from sniff.analysis.profile_findings import ProfileFindings
+    from sniff.analysis.bulk_profile_findings import BulkProfileFindings
     from sniff.engine.table import Table
 
 _DOUBTFUL = frozenset(
@@ -225,10 +225,10 @@ class Judging:
         return replace(judged, bus=made)
 
 
-def _of_devices(session: Session, dissector: Dissector, devices: Devices) -> ProfileFindings:
-    from sniff.analysis.profile_findings import ProfileFindings  # with what reads and says values
+def _of_devices(session: Session, dissector: Dissector, devices: Devices) -> BulkProfileFindings:
+    from sniff.analysis.bulk_profile_findings import BulkProfileFindings  # with what reads and says values
 
-    return ProfileFindings(session.timing, dissector, devices)
+    return BulkProfileFindings(session.timing, dissector, devices)
 
 
 def is_strange(table: Table) -> bool:

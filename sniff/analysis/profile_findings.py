@@ -7,56 +7,27 @@ beyond what the adapter allows.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
-from dissectors.findings import Finding, Severity, Tally, times
+from dissectors.findings import Finding
 from dissectors.frame import Event, Frame, Header, Role
-from dissectors.line import NS_PER_S, Timing
+from dissectors.line import Timing
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.profiles.decoding import Value, bit_words, decode, in_range, number, range_words, state_words
 from dissectors.profiles.model import Access, Entry, EntryRole, Profile
 from dissectors.profiles.properties import due_property
 from dissectors.readings import Origin, Reading
-from dissectors.row_columns import RowColumns, in_turn
 from dissectors.subject import About, Subject, station
 from dissectors.tracker import Placement, Transaction
 from dissectors.words import milliseconds
+from sniff.analysis.device_remarks import MOST_TOLD, OF_STATUS, DeviceRemarks, Remark
 from sniff.analysis.point_reader import ALL, WHOLE, PointReader, Sample
-from sniff.analysis.profile_rules import PROFILE_RULES, WRITTEN_BEYOND, WRITTEN_NEXT
-from sniff.analysis.written_together import Written, together
 from sniff.engine.engine import Output, Row
-
-MOST_TOLD = 2_000
-"""Different things that are told of at most: rubbish that passes a check must not fill the memory."""
 
 CODES = {EntryRole.FAULT: "PR004", EntryRole.ALARM: "PR005"}
 
-OF_STATUS = "status word"
-"""Which of several things about a device: what its status word says, without saying why."""
-
 _READ_ONLY = "written, though it is read only"
-
-STATE_HOLDS = 10 * NS_PER_S
-"""How long what a device said of its state is taken to be so."""
-
-Key = tuple[str, Subject, str]
-"""Code, subject, and which of several things about it."""
-
-
-@dataclass(slots=True)
-class _Told:
-    """One finding in the making. `seen`: the first time; `is_same`: and each time after it. `worst`: ns, of the slowest
-    answer. `sure`: whether no layout behind it is a guess. `thing`: what was written, where that is all that counts.
-    `is_written`: a master gave the value."""
-
-    seen: str
-    thing: str = ""
-    is_same: bool = True
-    tally: Tally = field(default_factory=Tally)
-    worst: int = 0
-    sure: bool = True
-    is_written: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,18 +41,22 @@ class _InVain:
 
 
 class ProfileFindings:
-    """Fed every row and every closed transaction of one bus (`dissectors.findings.Judge`)."""
+    """Fed every row and every closed transaction of one bus (`dissectors.findings.Judge`).
 
-    def __init__(self, timing: Timing, dissector: Dissector, devices: Devices) -> None:
+    `remarks`: where what is found is told.
+    """
+
+    def __init__(
+        self, timing: Timing, dissector: Dissector, devices: Devices, remarks: DeviceRemarks | None = None
+    ) -> None:
         self._family = dissector.profile_family
         self._devices = devices
         self._reader = PointReader(dissector, devices)
         self._readings = dissector.readings
-        self._told: dict[Key, _Told] = {}
+        self._remarks = DeviceRemarks() if remarks is None else remarks
         self._answers: dict[Subject, int] = {}
         self._asks = dissector.asks
         self._in_vain: dict[int, _InVain] = {}  # by transaction
-        self._running: dict[int, tuple[int, str]] = {}  # by station: when it said that it runs, and how
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
         """Take the next row."""
@@ -111,7 +86,8 @@ class ProfileFindings:
             return
         if transaction.verdict in WHOLE:
             seen = f"{vain.words}: acknowledged, and not executed by this device"
-            self._add("PR010", _subject(profile, transaction.station), vain.words, seen, transaction.end, vain.no)
+            remark = Remark("PR010", _subject(profile, transaction.station), vain.words, seen)
+            self._remarks.tell(remark, transaction.end, vain.no)
         elif vain.readings:
             self._judge_writes(vain.no, vain.frame, transaction.station, vain.readings, transaction.kind)
 
@@ -131,40 +107,14 @@ class ProfileFindings:
         self._in_vain[placement.tx] = _InVain(no, frame, words, readings)
         return True
 
-    def take(self, rows: RowColumns) -> None:
-        """Take rows and what they closed (`dissectors.row_columns.JudgesColumns`)."""
-        in_turn(self, rows)
+    def subject_at(self, station: int | None) -> Subject | None:
+        """The device there; None where none has a profile."""
+        profile = self._devices.at(station)
+        return None if profile is None else _subject(profile, station)
 
     def findings(self) -> tuple[Finding, ...]:
-        """All findings so far, in the order of first sight.
-
-        A bit of a status word that says no more than a code or trip bit of the same device is left out.
-        """
-        worded = {(code, subject) for code, subject, which in self._told if which != OF_STATUS}
-        written = [Written(key, told.thing, told.tally) for key, told in self._told.items() if told.thing]
-        at_once = {one.key: seen for one, seen in together(written)}
-        return tuple(
-            self._found(key, told, at_once.get(key, ""))
-            for key, told in self._told.items()
-            if (key[2] != OF_STATUS or (key[0], key[1]) not in worded) and (not told.thing or key in at_once)
-        )
-
-    def _found(self, key: Key, told: _Told, at_once: str) -> Finding:
-        """`at_once`: what is seen of it and of all that was written with it."""
-        code, subject, _ = key
-        count, seen = told.tally.count, at_once or told.seen
-        if code == "PR007":
-            seen = f"{count} of {self._answers.get(subject, 0)} answers {seen}, the slowest at least "
-            seen += milliseconds(told.worst)
-        elif count > 1:
-            seen = (
-                f"{seen}, {times(count)}" if told.is_same or at_once else f"{seen}; that is the first of {count} times"
-            )
-        if told.sure:
-            finding = told.tally.found(PROFILE_RULES[code], subject, seen)
-            return replace(finding, means=WRITTEN_BEYOND, next=WRITTEN_NEXT) if told.is_written else finding
-        seen += ", as far as this is where the state stands in the answer, which no public source confirms"
-        return told.tally.found(PROFILE_RULES[code], subject, seen, Severity.NOTE)
+        """All findings so far, in the order of first sight."""
+        return self._remarks.findings(self._answers)
 
     # --- the rules ---
 
@@ -175,7 +125,7 @@ class ProfileFindings:
         if profile is not None and longest is not None and len(frame.octets) > longest:
             way = "from" if placement.role is Role.RESPONSE else "to"
             seen = f"frames of {len(frame.octets)} octets {way} it, {longest} allowed"
-            self._add("PR006", _subject(profile, station), way, seen, frame.end, no)
+            self._remarks.tell(Remark("PR006", _subject(profile, station), way, seen), frame.end, no)
 
     def _judge_number(self, no: int, frame: Frame, station: int | None) -> None:
         profile = self._devices.at(station)
@@ -183,7 +133,7 @@ class ProfileFindings:
         if profile is None or known is None or station is None or known[0] <= station <= known[1]:
             return
         seen = f"it answered as {station}; its manual has {known[0]} … {known[1]}"
-        self._add("PR012", _subject(profile, station), f"{station}", seen, frame.end, no)
+        self._remarks.tell(Remark("PR012", _subject(profile, station), f"{station}", seen), frame.end, no)
 
     def _judge_function(self, no: int, frame: Frame, station: int | None, code: int) -> None:
         profile = self._devices.at(station)
@@ -191,7 +141,7 @@ class ProfileFindings:
         if profile is not None and known is not None and code not in known:
             listed = " ".join(f"{one:02X}" for one in sorted(known))
             seen = f"asked with function {code:02X} (hex); its manual lists {listed}"
-            self._add("PR009", _subject(profile, station), f"{code}", seen, frame.end, no)
+            self._remarks.tell(Remark("PR009", _subject(profile, station), f"{code}", seen), frame.end, no)
 
     def _judge_writes(
         self, no: int, frame: Frame, station: int | None, readings: tuple[Reading, ...], kind: str
@@ -210,49 +160,39 @@ class ProfileFindings:
                 place = profile.number_of(reading.space, reading.address)
                 if profile.forbids(reading.space, reading.address, reading.raw):
                     seen = f"{reading.value} written to reserved {place}"
-                    self._add("PR002", who, place, seen, frame.end, no, thing=place)
+                    self._remarks.tell(Remark("PR002", who, place, seen, place), frame.end, no)
             elif not reading.part and f"{kind}:{reading.space}" in profile.limits_on(self._family).read_only:
                 place = f"{reading.space} {reading.address}"
-                self._add("PR003", who, place, f"{place} written by {kind}, which does not change it", frame.end, no)
+                self._remarks.tell(
+                    Remark("PR003", who, place, f"{place} written by {kind}, which does not change it"), frame.end, no
+                )
             elif f"{reading.space}:{reading.part}" in profile.limits_on(self._family).read_only:
                 place = f"{reading.space} {reading.address} {reading.part}"
-                self._add("PR003", who, place, f"{place} {_READ_ONLY}", frame.end, no, thing=place)
+                self._remarks.tell(Remark("PR003", who, place, f"{place} {_READ_ONLY}", place), frame.end, no)
             elif entry is not None and not entry.access.writable:
                 thing = f"{entry.title} ({entry.number})"
-                self._add("PR003", who, entry.name, f"{thing} {_READ_ONLY}", frame.end, no, thing=thing)
+                self._remarks.tell(Remark("PR003", who, entry.name, f"{thing} {_READ_ONLY}", thing), frame.end, no)
             elif entry is not None and (bits := _reserved_bits(entry, reading)):
                 words = " ".join(f"{bit:X}" for bit in bits)
                 seen = f"{entry.title} ({entry.number}) written with reserved bits {words} set"
-                self._add("PR008", who, f"{entry.name} {words}", seen, frame.end, no)
-            elif entry is not None and entry.access is Access.STOPPED and (state := self._state_at(station, frame)):
+                self._remarks.tell(Remark("PR008", who, f"{entry.name} {words}", seen), frame.end, no)
+            elif (
+                entry is not None
+                and entry.access is Access.STOPPED
+                and (state := self._remarks.state_at(station, frame.end))
+            ):
                 seen = f"{entry.title} ({entry.number}) written while its state was {state}; it is taken while stopped"
-                self._add("PR013", who, entry.name, seen, frame.end, no)
+                self._remarks.tell(Remark("PR013", who, entry.name, seen), frame.end, no)
             if entry is not None and entry.role is EntryRole.COMMAND:
-                self._forget_state(station)
+                self._remarks.forget_state(station)
         for value in decode(profile, readings):
             self._judge_range(value, who, frame.end, no)
-
-    def _state_at(self, station: int | None, frame: Frame) -> str:
-        """How a station said lately that it runs; empty where it did not."""
-        since, state = self._running.get(-1 if station is None else station, (0, ""))
-        return state if frame.end - since <= STATE_HOLDS else ""
-
-    def _forget_state(self, station: int | None) -> None:
-        """A command may change it; without a `station` that of all."""
-        if station is None:
-            self._running.clear()
-        else:
-            self._running.pop(station, None)
 
     def _note_state(self, entry: Entry, raw: int, sample: Sample) -> None:
         states = _running_states(entry, raw)
         if sample.device is None or not states:
             return
-        said = next(filter(None, states), "")
-        if said:
-            self._running[sample.device] = sample.time, said
-        else:
-            self._forget_state(sample.device)
+        self._remarks.note_state(sample.device, sample.time, next(filter(None, states), ""))
 
     def _judge_value(self, sample: Sample) -> None:
         profile = self._devices.at(sample.device)
@@ -282,7 +222,7 @@ class ProfileFindings:
         place = sign.title or reading.part or profile.number_of(reading.space, reading.address)
         shown, due = (f"{one:04X}h" if isinstance(one, int) else number(one) for one in (reading.value, sign.value))
         seen = f"{place} is {shown}, {profile.title} has {due}"
-        self._add("PR011", who, place, seen, sample.time, sample.frame)
+        self._remarks.tell(Remark("PR011", who, place, seen), sample.time, sample.frame)
 
     def _judge_property(self, profile: Profile, reading: Reading, who: Subject, sample: Sample) -> None:
         entry = profile.at(reading.space, reading.address)
@@ -290,22 +230,25 @@ class ProfileFindings:
         if entry is not None and due is not None:
             place = f"{entry.number} {reading.part}"
             shown = reading.words or number(reading.value)
-            self._add("PR011", who, place, f"{place} is {shown}, the manual has {due}", sample.time, sample.frame)
+            remark = Remark("PR011", who, place, f"{place} is {shown}, the manual has {due}")
+            self._remarks.tell(remark, sample.time, sample.frame)
 
     def _add_trouble(self, code: str, who: Subject, which: str, seen: str, sample: Sample) -> None:
-        told = self._add(code, who, which, seen, sample.time, sample.frame)
-        if told is not None:
-            told.sure = told.sure or sample.value.reading.sure
+        remark = Remark(code, who, which, seen, sure=sample.value.reading.sure)
+        self._remarks.tell(remark, sample.time, sample.frame)
 
     def _judge_range(self, value: Value, who: Subject, time: int, no: int) -> None:
         entry = value.entry
         if entry is None or value.bit or entry.doubt or not value.reading.sure or in_range(entry, value.value):
             return
-        what = "written" if value.how is Origin.WRITE else "answered"
+        is_written = value.how is Origin.WRITE
+        what = "written" if is_written else "answered"
         seen = f"{entry.title} {number(value.value, entry, value.unit)} {what}, range {range_words(entry)}"
-        told = self._add("PR001", who, f"{entry.name} {what}", seen, time, no)
-        if told is not None:
-            told.is_written = value.how is Origin.WRITE
+        remark = Remark("PR001", who, f"{entry.name} {what}", seen, is_written=is_written)
+        self._remarks.tell(remark, time, no)
+
+    def _count_answer(self, who: Subject) -> None:
+        self._answers[who] = self._answers.get(who, 0) + 1
 
     def _judge_time(self, transaction: Transaction) -> None:
         profile = self._devices.at(transaction.station)
@@ -313,26 +256,12 @@ class ProfileFindings:
         if profile is None or latency is None or transaction.response is None:
             return
         who = _subject(profile, transaction.station)
-        self._answers[who] = self._answers.get(who, 0) + 1
+        self._count_answer(who)
         limit = profile.limits_on(self._family).response
         if limit is not None and latency.low > limit:
             seen = f"took over {milliseconds(limit)}"
-            told = self._add("PR007", who, "", seen, transaction.end, transaction.response)
-            if told is not None:
-                told.worst = max(told.worst, latency.low)
-
-    def _add(
-        self, code: str, subject: Subject, which: str, seen: str, time: int, no: int, thing: str = ""
-    ) -> _Told | None:
-        key = code, subject, which
-        told = self._told.get(key)
-        if told is None:
-            if len(self._told) >= MOST_TOLD:
-                return None
-            told = self._told[key] = _Told(seen, thing, sure=code not in CODES.values())
-        told.is_same = told.is_same and told.seen == seen
-        told.tally.add(time, no)
-        return told
+            remark = Remark("PR007", who, "", seen)
+            self._remarks.tell(remark, transaction.end, transaction.response, latency.low)
 
 
 def _reserved_bits(entry: Entry, reading: Reading) -> tuple[int, ...]:

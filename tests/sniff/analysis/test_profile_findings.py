@@ -153,7 +153,7 @@ def test_no_profile_no_finding() -> None:
 
 
 def test_memory_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sniff.analysis.profile_findings.MOST_TOLD", 1)
+    monkeypatch.setattr("sniff.analysis.device_remarks.MOST_TOLD", 1)
     assert len(judged(("010625080001", "018604"), ("010625090001", "018604"))) == 1
 
 
