@@ -18,7 +18,6 @@ from sniff.box import page
 from sniff.box.status import BoxStatus, BusStatus
 from sniff.recording.reader import buses_of
 from sniff.recording.rotation import parts
-from tests.e2e import warm_start
 from tests.e2e.recording_bus import capture_processes, wait_until
 from tests.e2e.running import rest_of
 
@@ -106,7 +105,7 @@ class Bench:
 
     def spawn(self, command: list[str]) -> subprocess.Popen[str]:
         self._running.append(
-            warm_start.Popen(
+            subprocess.Popen(
                 command, cwd=self.folder, env=self.environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                 text=True, start_new_session=True,
             )

@@ -23,7 +23,6 @@ from typing import Any
 from dissectors.frame import Chunk
 from sniff.engine.capture import CaptureError
 from sniff.formats import read
-from tests.e2e import warm_start
 
 LINE = ("-s", "115200,8N1", "-p", "modbus-rtu")
 PATIENCE = 60.0
@@ -101,7 +100,7 @@ class Command:
     def __init__(self, folder: Path, *arguments: str, environment: dict[str, str] | None = None) -> None:
         here = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2]), **(environment or {})}
         self.folder = folder
-        self.process = warm_start.Popen(
+        self.process = subprocess.Popen(
             [sys.executable, "-m", "sniff", *arguments], cwd=folder, env=here, stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE, text=True, start_new_session=True,
         )  # fmt: skip

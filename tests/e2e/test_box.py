@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import subprocess
 import sys
 import textwrap
 from collections.abc import Iterator
@@ -16,7 +17,6 @@ from dissectors.modbus.envelope import seal_rtu
 from sniff.box.status import State
 from sniff.recording.reader import buses_of
 from sniff.recording.rotation import parts
-from tests.e2e import warm_start
 
 pytest.importorskip("termios")
 
@@ -59,13 +59,13 @@ def test_ports_come_and_go_and_it_says_so(box: Bench) -> None:
     wait_until(lambda: box.bus("roof").octets == len(roof.sent), "the octets are not on the status page")
 
     words = [sys.executable, "-m", "sniff", "box", "status"]
-    asked = warm_start.run(words, cwd=box.folder, env=box.environment(), capture_output=True, text=True)
+    asked = subprocess.run(words, cwd=box.folder, env=box.environment(), capture_output=True, text=True)
     assert asked.returncode == 1, asked.stderr
     assert "DOWN" in asked.stdout
-    told = warm_start.run([*words, "--json"], cwd=box.folder, env=box.environment(), capture_output=True, text=True)
+    told = subprocess.run([*words, "--json"], cwd=box.folder, env=box.environment(), capture_output=True, text=True)
     assert json.loads(told.stdout)["buses"][1]["octets"] == len(roof.sent)
 
-    second = warm_start.run([*words[:-1]], cwd=box.folder, env=box.environment(), capture_output=True, text=True)
+    second = subprocess.run([*words[:-1]], cwd=box.folder, env=box.environment(), capture_output=True, text=True)
     assert second.returncode == 2
     assert f"box site runs already: process {process.pid}" in second.stderr
 

@@ -19,7 +19,6 @@ from sniff.formats import read
 from sniff.simulation.bus import VirtualBus
 from sniff.simulation.ports import HAS_PTY
 from sniff.simulation.scenarios import scenario
-from tests.e2e import warm_start
 from tests.e2e.running import PATIENCE, rest_of
 
 LONGEST = 40
@@ -29,7 +28,7 @@ pytestmark = pytest.mark.skipif(not HAS_PTY, reason="this system has no pseudo-t
 
 
 def sniff485(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return warm_start.run(
+    return subprocess.run(
         [sys.executable, "-m", "sniff", *arguments], capture_output=True, text=True, timeout=100, check=False
     )
 
@@ -59,7 +58,7 @@ def test_rubbish_is_not_called_silent() -> None:
     with VirtualBus(LineSettings.parse("115200,8N1")) as bus:
         port, noise = bus.tap(), bus.connect("noise")
         noise.write(bytes(range(7, 250, 3)) * 3)
-        process = warm_start.Popen(
+        process = subprocess.Popen(
             [sys.executable, "-m", "sniff", "detect", port, "--json", "--timeout", "3"],
             stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
         )  # fmt: skip
@@ -83,7 +82,7 @@ def test_record_goes_on_with_what_was_found_on_the_same_opening(tmp_path: Path) 
     path = tmp_path / "found.mcap"
     with VirtualBus.from_scenario(scenario("mstp", 1, False)) as bus:
         words = "record", bus.tap(), "-p", "auto", "-s", "38400,8N1", "-w", str(path)
-        process = warm_start.Popen(
+        process = subprocess.Popen(
             [sys.executable, "-m", "sniff", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         assert process.stderr is not None
@@ -107,7 +106,7 @@ def test_record_goes_on_with_what_was_found_on_the_same_opening(tmp_path: Path) 
 def test_live_goes_on_with_what_was_found(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "sniff", "live", "-s", "auto", "-p", "n2", "--no-record", "--json"]
     with VirtualBus.from_scenario(scenario("n2", 1, False)) as bus:
-        ran = warm_start.Popen([*command, bus.tap()], stdout=subprocess.PIPE, text=True)
+        ran = subprocess.Popen([*command, bus.tap()], stdout=subprocess.PIPE, text=True)
         assert ran.stdout is not None
         heard = (row for row in map(json.loads, ran.stdout) if "record" not in row)
         rows = list(islice(heard, 6))

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from tests.e2e import warm_start
-
 COMMAND = [sys.executable, "-m", "sniff", "extcap"]
 
 
 def ask(*arguments: str) -> str:
-    ran = warm_start.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=60, check=True)
+    ran = subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=60, check=True)
     return ran.stdout
 
 
@@ -37,7 +36,7 @@ def test_tshark_reads_a_live_bus_and_its_going_ends_the_capture(tmp_path: Path, 
     os.mkfifo(fifo)
     bus = virtual_bus("modbus-rtu", faults=False)
     port = f"sniff485:{bus.tap()}"
-    capture = warm_start.Popen([*COMMAND, "--capture", "--fifo", str(fifo), "--extcap-interface", port,
+    capture = subprocess.Popen([*COMMAND, "--capture", "--fifo", str(fifo), "--extcap-interface", port,
                                 "-p", "modbus-rtu", "-s", "19200,8E1"])  # fmt: skip
     try:
         with fifo.open("rb") as stream:
@@ -55,7 +54,7 @@ def test_tshark_reads_a_live_bus_and_its_going_ends_the_capture(tmp_path: Path, 
                 "-e",
                 "_ws.malformed",
             ]
-            ran = warm_start.run(command, stdin=stream, capture_output=True, text=True, timeout=60, check=True)
+            ran = subprocess.run(command, stdin=stream, capture_output=True, text=True, timeout=60, check=True)
         assert capture.wait(30) == 0
     finally:
         capture.kill()

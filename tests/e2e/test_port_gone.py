@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from sniff.formats import read
-from tests.e2e import warm_start
 
 pytest.importorskip("termios")
 POLL = bytes.fromhex("010300000002c40b")
@@ -21,7 +20,7 @@ CAPTURE = "#!sniff-capture 1\n# line: 19200,8E1\n# protocol: modbus-rtu\n+0 01 0
 def sniff485(folder: Path, *arguments: str) -> subprocess.Popen[str]:
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     command = [sys.executable, "-m", "sniff", *arguments, "-s", "19200,8E1"]
-    return warm_start.Popen(command, cwd=folder, env=environment, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen(command, cwd=folder, env=environment, stderr=subprocess.PIPE, text=True)
 
 
 @pytest.mark.parametrize("quiet", [(), ("-q",)])

@@ -25,7 +25,6 @@ from sniff.capture.config import SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.cli import main
 from sniff.formats import read
-from tests.e2e import warm_start
 
 pytest.importorskip("termios")
 
@@ -84,7 +83,7 @@ def begin(tmp_path: Path) -> Iterator:
     def begin(*arguments: str, **options) -> subprocess.Popen[str]:
         command = [sys.executable, "-m", "sniff", *arguments]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        running.append(warm_start.Popen(command, cwd=tmp_path, env=environment(), **pipes, **options))
+        running.append(subprocess.Popen(command, cwd=tmp_path, env=environment(), **pipes, **options))
         return running[-1]
 
     yield begin
@@ -396,7 +395,7 @@ def test_on_a_terminal_it_says_that_it_searches(tmp_path, begin) -> None:
     quiet = Bus(tmp_path / "quiet", bytes, 10)
     terminal, errors = os.openpty()
     try:
-        process = warm_start.Popen(
+        process = subprocess.Popen(
             [sys.executable, "-m", "sniff", "record", str(quiet.link), "-s", "auto", "-w", "x.mcap"],
             cwd=tmp_path, env=environment(), stderr=errors, stdout=subprocess.DEVNULL,
         )  # fmt: skip

@@ -18,7 +18,6 @@ from dissectors.frame import Chunk
 from dissectors.modbus.envelope import seal_rtu
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.recording.reader import McapCapture
-from tests.e2e import warm_start
 
 pytest.importorskip("termios")
 
@@ -68,7 +67,7 @@ def record(tmp_path: Path) -> Iterator:
         environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
         command = [sys.executable, "-m", "sniff", "record", *words, "-w", "site.mcap"]
         running.append(
-            warm_start.Popen(
+            subprocess.Popen(
                 command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
             )
         )

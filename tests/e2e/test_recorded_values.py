@@ -5,13 +5,12 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
-
-from tests.e2e import warm_start
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals")
 
@@ -45,7 +44,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "*=teco-e510",
     ]
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-    ran = warm_start.run(command, capture_output=True, text=True, timeout=60, cwd=folder, env=environment, check=False)
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=folder, env=environment, check=False)
     assert ran.returncode == 0, ran.stderr
     assert "read status, fault" in ran.stdout
     return path
@@ -79,7 +78,7 @@ def test_the_channels_hold_what_points_computes(recording: Path) -> None:
     from mcap.reader import make_reader
 
     command = [sys.executable, "-m", "sniff", "points", str(recording), "--json"]
-    ran = warm_start.run(command, capture_output=True, text=True, timeout=60, check=True, cwd=Path(__file__).parents[2])
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True, cwd=Path(__file__).parents[2])
     computed = {}
     for line in ran.stdout.splitlines():
         sample = json.loads(line)

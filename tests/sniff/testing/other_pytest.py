@@ -11,5 +11,4 @@ HYPOTHESIS = "hypothesispytest"
 def pytest_command(*arguments: object, hypothesis: bool = False) -> list[str]:
     """Without the plugins of other packages: importing them took more than half of each run."""
     left_out = UNUSED if hypothesis else (*UNUSED, HYPOTHESIS)
-    options = [*(f"-pno:{name}" for name in left_out), "-Wignore::pytest.PytestAssertRewriteWarning"]
-    return [sys.executable, "-m", "pytest", "-q", *options, *map(str, arguments)]  # ours is imported by then
+    return [sys.executable, "-m", "pytest", "-q", *(f"-pno:{name}" for name in left_out), *map(str, arguments)]

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.e2e import warm_start
 from tests.sniff.testing.other_pytest import pytest_command
 
 EXAMPLE = Path(__file__).parent / "example_project"
@@ -27,7 +26,7 @@ def project(tmp_path: Path) -> Path:
 def run(project: Path) -> Run:
     def pytest_in(*arguments: str) -> subprocess.CompletedProcess[str]:
         environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST", "COV"))}
-        return warm_start.run(
+        return subprocess.run(
             pytest_command(*arguments), cwd=project, env=environment, capture_output=True, text=True, timeout=100
         )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,6 @@ import pytest
 from sniff.testing import craft, expectation_path, read_capture, render
 from sniff.testing.crafting import makers
 from sniff.testing.naming import is_capture
-from tests.e2e import warm_start
 from tests.sniff.testing.other_pytest import pytest_command
 
 CAPTURE = "#!sniff-capture 1\n# line: 19200,8E1\n# protocol: modbus-rtu\n+0 01 03 00 00 00 02 C4 0B\n"
@@ -19,7 +19,7 @@ CAPTURE = "#!sniff-capture 1\n# line: 19200,8E1\n# protocol: modbus-rtu\n+0 01 0
 def pytest_in(folder: Path, *arguments: str) -> str:
     environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST", "COV"))}
     command = pytest_command(*arguments)
-    return warm_start.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=100).stdout
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=100).stdout
 
 
 @pytest.fixture
