@@ -26,6 +26,9 @@ MOST_OPEN = 20_000
 MOST_ASKED = 512
 """Requests remembered after their transaction closed, for answers that come late; tokens are none."""
 
+MOST_HEARD = 65_536
+"""Values that are remembered with what said them: most exchanges of a poll list were heard before, octet for octet."""
+
 ALL = "all"
 """Name of the device that a broadcast is for."""
 
@@ -33,6 +36,9 @@ WHOLE = frozenset({Verdict.ANSWERED, Verdict.RETRY})
 ALONE = frozenset({Verdict.BROADCAST, Verdict.DATA})
 TELLING = WHOLE | ALONE | {Verdict.LATE}
 """Exchanges whose frames may carry values that count."""
+
+
+_StationValues = tuple[int | None, tuple[Value, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +100,8 @@ class PointReader:
         self._readings = dissector.readings
         self.frames: OrderedDict[int, Frame] = OrderedDict()
         self.asked: OrderedDict[int, Remembered] = OrderedDict()
+        self._heard: dict[tuple[bytes, bytes | None, int | None], _StationValues] = {}
+        self._held = 0  # values in it
 
     def add(self, output: Output) -> list[Sample]:
         """Take rows and closed transactions; give the samples that these complete, in the order of closing."""
@@ -152,18 +160,18 @@ class PointReader:
 
     def samples(self, exchange: ValuedExchange) -> Iterator[Sample]:
         """What an exchange tells."""
-        request, response = exchange.request, exchange.response
-        readings = self._readings(request.frame, response.frame if response else None) if self._readings else ()
-        if not readings:
+        request, response, transaction = exchange.request, exchange.response, exchange.transaction
+        station, values = self._values(
+            request.frame,
+            response.frame if response else None,
+            None if transaction.verdict is Verdict.BROADCAST else transaction.station,
+        )
+        if not values:
             return
-        transaction = exchange.transaction
-        station = None if transaction.verdict is Verdict.BROADCAST else transaction.station
-        if readings[0].station is not None:
-            station = readings[0].station
         confirmed = (response or request).frame.end
         profile = self.devices.at(station)
         limits = profile.limits_on(self.dissector.profile_family) if profile is not None else None
-        for value in decode(profile, readings):
+        for value in values:
             if (
                 limits is not None
                 and value.how is Origin.WRITE
@@ -174,6 +182,26 @@ class PointReader:
             yield Sample(
                 confirmed, station, value, (response or carrier).no if value.how is Origin.REPORT else carrier.no
             )
+
+    def _values(self, request: Frame, response: Frame | None, station: int | None) -> _StationValues:
+        """What two frames say, which is worked out once for those that say it by their octets alone."""
+        frames = (request,) if response is None else (request, response)
+        if any(frame.flags or frame.repair is not None or frame.assembly is not None for frame in frames):
+            return self._read(request, response, station)
+        heard = request.octets, None if response is None else response.octets, station
+        known = self._heard.get(heard)
+        if known is None:
+            known = self._heard[heard] = self._read(request, response, station)
+            self._held += 1 + len(known[1])
+            if self._held > MOST_HEARD:
+                self._heard, self._held = {}, 0
+        return known
+
+    def _read(self, request: Frame, response: Frame | None, station: int | None) -> _StationValues:
+        readings = self._readings(request, response) if self._readings else ()
+        if readings and readings[0].station is not None:
+            station = readings[0].station
+        return station, decode(self.devices.at(station), readings)
 
     def _take(self, no: int | None) -> Remembered | None:
         frame = self.frames.pop(no, None) if no is not None else None

@@ -18,8 +18,9 @@ from dissectors.profiles import Devices
 from dissectors.profiles.model import Access, EntryRole
 from dissectors.profiles.packaged import packaged
 from dissectors.row_columns import in_turn
-from sniff.analysis import bulk_profile_findings
+from sniff.analysis import bulk_profile_findings, point_reader
 from sniff.analysis.bulk_profile_findings import BulkProfileFindings
+from sniff.analysis.point_reader import PointReader, Sample
 from sniff.analysis.profile_findings import ProfileFindings
 from sniff.bus.offline import outputs
 from sniff.engine.engine import Output
@@ -164,3 +165,15 @@ def test_what_was_heard_before_is_not_read_again(monkeypatch: pytest.MonkeyPatch
     judge = BulkProfileFindings(session.timing, dissector_for(session), DRIVES)
     judge.take(table)
     assert len(seen) == 4
+
+
+@pytest.mark.parametrize("held", [3, 40, 1 << 16])
+def test_values_that_were_heard_before_are_the_same(held: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    _, dissector, (table,) = drives(0)
+
+    def samples(most: int) -> list[Sample]:
+        monkeypatch.setattr(point_reader, "MOST_HEARD", most)
+        reader = PointReader(dissector, DRIVES)
+        return [sample for output in table.outputs() for sample in reader.add(output)]
+
+    assert samples(held) == samples(-1)  # nothing is kept
