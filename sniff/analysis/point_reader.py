@@ -26,7 +26,7 @@ MOST_OPEN = 20_000
 MOST_ASKED = 512
 """Requests remembered after their transaction closed, for answers that come late; tokens are none."""
 
-MOST_HEARD = 65_536
+MOST_HEARD = 2_048
 """Values that are remembered with what said them: most exchanges of a poll list were heard before, octet for octet."""
 
 ALL = "all"
