@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from dissectors.columns import Masks, Times
 
-MOST_KNOWN = 1 << 16
+MOST_KNOWN = 1 << 13
 """Different exchanges of which it is remembered what they say."""
 
 _WHOLE = np.array([verdict in WHOLE for verdict in VERDICTS])
